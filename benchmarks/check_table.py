@@ -18,9 +18,9 @@ import numpy as np
 import smallest
 
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.pipeline.check_calibration import CalibrationCheck, SilhouetteSets, gather_silhouettes, judge_calibration
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.repair.check import CalibrationCheck, SilhouetteSets, gather_silhouettes, judge_calibration
 from shadowpuppet.pipeline.rig import Rig, open_rig
 
 MARGIN = 12

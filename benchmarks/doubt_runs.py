@@ -23,7 +23,7 @@ from shadowpuppet.motion.synchronization import at_times
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
-from shadowpuppet.pipeline.survey import survey_rig
+from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.synthetic import proving_rings, synthesize
 from shadowpuppet.tracking.doubt.doubt import Points, pose_deviations
 from shadowpuppet.tracking.doubt.monocular import MonocularDoubt

@@ -34,7 +34,7 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, fit_multiview
 from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
-from shadowpuppet.pipeline.survey import survey_rig
+from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 
 ROWS: dict[str, dict[str, Any]] = {

@@ -58,6 +58,10 @@ TURNS = (
     ("fresh_a", "woman", 71, "turn_around 2.5, wave_hands 2, turn_around 3", 1, False),
     ("fresh_b", "man", 72, "wave_hands 2, turn_around 3, reach 2", 1, False),
     ("fresh_c", "man", 73, "turn_around 3.5, turn_around 2.5", 1, False),
+    ("later_a", "man", 301, "turn_around 2.5, turn_around 2.5", 1, False),
+    ("later_b", "woman", 302, "turn_around 2.5, reach 2, turn_around 2.5", 1, False),
+    ("later_c", "child", 303, "wave_hands 2, turn_around 2.5", 1, False),
+    ("later_d", "man", 304, "turn_around 2.4, turn_around 4", 1, False),
     ("two_turns", "man", 45, "turn_around 3, reach 3, turn_around 3", 2, False),
     ("three_walk", "man", 46, "walk 7", 3, False),
 )

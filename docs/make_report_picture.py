@@ -1,6 +1,6 @@
 """Make docs/assets/report.png, the page of `evaluate --report`: python docs/make_report_picture.py [DEMO]. Needs Chromium, and a minute.
 
-DEMO is a folder that `shadowpuppet demo` made; without one it is made anew.
+DEMO is a folder that `shadowpuppet demo` made; without one it is made again.
 """
 
 from __future__ import annotations

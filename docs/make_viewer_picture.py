@@ -1,6 +1,6 @@
 """Make docs/assets/viewer*.png, the page of `view`: python docs/make_viewer_picture.py [DEMO]. Needs Chromium, Playwright, and minutes.
 
-DEMO is a folder that `shadowpuppet demo` made; without one it is made anew.
+DEMO is a folder that `shadowpuppet demo` made; without one it is made again.
 """
 
 from __future__ import annotations

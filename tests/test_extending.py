@@ -66,7 +66,7 @@ def test_what_a_cost_asks_for_is_done_from_the_first_frame_on(settings):
     assert np.abs(poses_of(tracked(**settings))[:, elbow] - 1.2).min() > 0.3
 
 
-def test_costs_get_whole_poses_and_what_is_told_stays_that_of_the_silhouette():
+def test_costs_get_whole_poses_and_what_is_reported_stays_that_of_the_silhouette():
     shapes: set[tuple[int, ...]] = set()
 
     def much(poses):

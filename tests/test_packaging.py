@@ -69,12 +69,12 @@ def test_versions_agree():
     assert cited[1] == PROJECT["version"] == shadowpuppet.__version__
 
 
-def test_the_licence_is_the_one_that_is_told():
+def test_the_licence_is_the_one_that_is_reported():
     assert PROJECT["license"] == "BSD-3-Clause"
     assert (ROOT / "LICENSE").read_text("utf-8").startswith("BSD 3-Clause License")
 
 
-def test_changes_of_this_version_are_told():
+def test_changes_of_this_version_are_reported():
     assert "## [Unreleased]" in (ROOT / "CHANGELOG.md").read_text("utf-8")
 
 

@@ -17,7 +17,7 @@ from papers.common.many import shown_progress
 from papers.liu2011.material import Case, seen
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.run import write_metrics
+from shadowpuppet.io.run_writer import write_metrics
 from shadowpuppet.pipeline.batch import BatchListener, make_grid, run_batch
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.progress import Listener

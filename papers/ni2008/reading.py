@@ -24,7 +24,7 @@ from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
-from shadowpuppet.pipeline.survey import survey_rig
+from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings

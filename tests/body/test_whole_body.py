@@ -16,6 +16,7 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.synthetic.person.mannequin import JOINTS
+from shadowpuppet.synthetic.truth import SOLES
 
 BODY = {name: make_body(name, average_sizes(name, 1.75)) for name in WHOLE}
 
@@ -46,12 +47,33 @@ def mirrored(skeleton: Skeleton, poses: np.ndarray) -> np.ndarray:
 # Counts and sizes -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("name", "dofs", "parts"), [("anatomical", 32, 17), ("cylinders", 25, 10)])
-def test_as_many_dof_and_parts_as_said_and_the_17_joints(name, dofs, parts):
+@pytest.mark.parametrize(("name", "dofs", "parts", "soles"), [("anatomical", 32, 17, SOLES), ("cylinders", 25, 10, ())])
+def test_as_many_dof_parts_and_joints_as_said(name, dofs, parts, soles):
     body = BODY[name]
     assert (len(body.skeleton.dofs), len(body.parts), limbs_of(body).parts) == (dofs, parts, body.parts)
-    assert set(body.landmark_names) == set(JOINTS)
+    assert set(body.landmark_names) == {*JOINTS, *soles}
     assert body.hem is None
+
+
+def test_heel_and_toe_lie_on_the_sole_and_move_with_the_foot():
+    body = BODY["anatomical"]
+    for side, out in (("left", 1.0), ("right", -1.0)):
+        flat = body.points(np.zeros((1, 32)), names=[f"{side}_{name}" for name in ("ankle", "heel", "toe")])[0]
+        ankle, heel, toe = flat
+        assert heel[2] == toe[2] < ankle[2] - 0.05
+        assert heel[0] < ankle[0] < toe[0]
+        assert 0.18 < toe[0] - heel[0] < 0.25
+        assert out * (toe[1] - heel[1]) > 0  # toes are turned out
+        turned = body.points(body.skeleton.pose(**{f"{side}_ankle_flexion": 0.3})[None], names=[f"{side}_toe"])[0, 0]
+        assert turned[2] < toe[2] - 0.03  # toes down
+
+
+def test_the_shanks_middle_lies_outside_the_bone():
+    body = BODY["anatomical"]
+    limbs = limbs_of(body)
+    for side, out in (("left", 1.0), ("right", -1.0)):
+        n = limbs.parts.index(f"{side}_shank")
+        assert (out * np.array([limbs.starts[n, 1], limbs.ends[n, 1]]) > 0.004).all()
 
 
 def measures(body: Body) -> np.ndarray:

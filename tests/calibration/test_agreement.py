@@ -159,7 +159,7 @@ def test_nothing_seen_is_nothing_said(cameras):
         assert found.doubts() == ()
 
 
-def test_two_cameras_can_only_be_told_to_disagree(cameras, masks):
+def test_two_cameras_can_only_be_reported_to_disagree(cameras, masks):
     two = [cameras[0], moved(cameras[1], 8)]
     (doubt,) = agreement(two, [row[:2] for row in masks], STEP).doubts()
     assert "do not fit together" in doubt or "it seems" in doubt

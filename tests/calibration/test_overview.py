@@ -44,7 +44,7 @@ def test_where_they_stand_and_what_they_look_at(path, rig):
     assert look.doubts == ()
 
 
-def test_a_roll_is_told_clockwise(tmp_path, rig):
+def test_a_roll_is_reported_clockwise(tmp_path, rig):
     """The camera turned clockwise about its axis: its right side goes down."""
     turned = replace(rig[0], T_camera_world=rigid(rotation_from_vector([0, 0, -np.radians(20)]), np.zeros(3)) @ rig[0].T_camera_world)
     assert (turned.T_camera_world[:3, :3].T @ [1, 0, 0])[2] < 0

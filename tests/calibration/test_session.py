@@ -59,7 +59,7 @@ def test_given_lenses_are_kept(copy):
         assert np.linalg.norm(camera.centre - true.centre) < 0.03
 
 
-def test_a_mirrored_film_is_told(copy):
+def test_a_mirrored_film_is_reported(copy):
     shutil.rmtree(copy)
     boards.pictured(copy, rig()[:1], 3, mirrored=True)
     with pytest.raises(CalibrationError, match="the film is mirrored"):

@@ -14,7 +14,7 @@ from shadowpuppet.body.models import make_body
 from shadowpuppet.body.upper_body import CardboxSizes
 from shadowpuppet.camera import drawing
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.drawing import draw_model, draw_skeleton, matching, overlay_frame
+from shadowpuppet.camera.drawing import PALE, SIDE_COLOURS, draw_model, draw_skeleton, matching, overlay_frame
 from shadowpuppet.camera.rasterize import Picture, unpack
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, rigid
@@ -166,6 +166,29 @@ def test_without_a_pose_nothing_is_drawn(rng):
     np.testing.assert_array_equal(bottom[LABEL:], image[LABEL:])
     np.testing.assert_array_equal(middle[LABEL:], matching(np.zeros_like(mask), mask)[LABEL:])
     assert (top[LABEL:] <= image[LABEL:].max() * 0.41).all()
+
+
+def test_without_a_pose_the_last_one_is_drawn_pale_with_its_time(rng):
+    picture = a_picture()
+    image, mask = a_scene(rng, picture)
+    lost = {"status": "lost", "time": 3.5}
+    top, middle, bottom = rows(overlay_frame(image, mask, picture, np.full(12, np.nan), **lost, last=(a_pose(picture), 3.0)))
+    without = rows(overlay_frame(image, mask, picture, np.full(12, np.nan), **lost))
+    np.testing.assert_array_equal(top, without[0])
+    np.testing.assert_array_equal(middle, without[1])
+    assert (bottom[LABEL:] != without[2][LABEL:]).any()
+    assert (bottom[:LABEL] != without[2][:LABEL]).any()
+    followed = rows(overlay_frame(image, mask, picture, a_pose(picture), **lost))[2]
+    assert (bottom[LABEL:] != followed[LABEL:]).any()  # pale and dashed
+
+
+def test_the_colours_are_explained(rng):
+    picture = a_picture()
+    image, mask = a_scene(rng, picture)
+    top, middle, _ = rows(overlay_frame(image * 0, mask & False, picture, np.full(12, np.nan), status="lost", time=3.5))
+    for colour in (*SIDE_COLOURS.values(), PALE):
+        assert (np.abs(top[:LABEL].astype(int) - colour).max(2) < 12).any(), colour
+    assert (middle[:LABEL].min(2) > 240).any()
 
 
 def test_status_time_and_overlap_are_written(rng):

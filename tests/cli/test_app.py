@@ -82,7 +82,7 @@ def test_help_loads_no_kernels_and_fits_a_terminal():
         assert flag in done.stdout
 
 
-def test_the_version_is_told_by_the_module_too():
+def test_the_version_is_reported_by_the_module_too():
     child = process("--version")
     out, err = child.communicate()
     assert (child.returncode, err) == (0, "")
@@ -410,9 +410,9 @@ def test_a_truncated_film_gives_what_it_has(shell, spoilt, tmp_path):
 
 
 def test_a_full_disk(shell, recording, monkeypatch, tmp_path):
-    import shadowpuppet.io.run
+    import shadowpuppet.io.run_writer
 
-    lines, real = [], shadowpuppet.io.run.csv_line
+    lines, real = [], shadowpuppet.io.run_writer.csv_line
 
     def full(cells):
         lines.append(cells)
@@ -420,7 +420,7 @@ def test_a_full_disk(shell, recording, monkeypatch, tmp_path):
             raise OSError(28, "No space left on device")
         return real(cells)
 
-    monkeypatch.setattr(shadowpuppet.io.run, "csv_line", full)
+    monkeypatch.setattr(shadowpuppet.io.run_writer, "csv_line", full)
     said = refused(shell, "track", recording, "-o", "run", *QUICK)
     assert "run: the run cannot be written (no space left on device); the 10 frames so far are in joints.csv" in said
     assert 9 <= len(read_run(tmp_path / "run").motion) <= 10

@@ -100,7 +100,7 @@ def test_kernels_that_are_wrong_break_the_core(monkeypatch):
     assert (found.state, found.needed) == ("broken", True)
 
 
-def test_what_is_not_there_is_told_with_what_would_bring_it(monkeypatch):
+def test_what_is_not_there_is_reported_with_what_would_bring_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     monkeypatch.setattr(doctor, "CODECS", {"Nonsense": "no_such_codec", "H.264": "h264"})
     monkeypatch.setattr(doctor, "_writable", lambda _: False)

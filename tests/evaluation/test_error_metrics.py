@@ -136,7 +136,7 @@ def test_axes_have_signs_and_leave_out_what_is_lost():
 
 
 @given(st.floats(0.2, 3.0))
-def test_another_world_is_told_by_what_one_rigid_motion_makes_good(angle):
+def test_another_world_is_reported_by_what_one_rigid_motion_makes_good(angle):
     run = turned(noisy(0.01), [0, 0, angle], [2, -1, 0])
     found = world_difference(measured(run), run, TRUTH)
     assert found["apart"]
@@ -192,7 +192,7 @@ def test_accelerations_are_compared_where_both_are_known():
     assert acceleration_errors(short, short) == {}
 
 
-def test_bones_that_are_longer_or_change_are_told():
+def test_bones_that_are_longer_or_change_are_reported():
     names = ("left_hip", "left_knee")
     places = np.zeros((4, 2, 3))
     places[:, 1, 2] = -0.4

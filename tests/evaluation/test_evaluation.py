@@ -187,7 +187,7 @@ def test_a_skeleton_of_another_program_is_a_truth(tmp_path):
     assert measured["errors"]["mean_mm"] == pytest.approx(50, abs=0.01)
 
 
-def test_names_that_are_missing_are_told_as_the_file_has_them(shell, folder, tmp_path):
+def test_names_that_are_missing_are_reported_as_the_file_has_them(shell, folder, tmp_path):
     write_joints(tmp_path / "t.trc", moved(TRUTH.select(("left_knee", "right_knee")), names=("LKnee", "Strange")))
     said = refused(shell, folder / "run", "t.trc", "--joints", "left_knee,right_knee")
     assert "found 'right_knee', which the truth lacks" in said

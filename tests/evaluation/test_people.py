@@ -39,7 +39,7 @@ def test_misses_and_ghosts():
     assert who.count_right == pytest.approx(5 / T)
 
 
-def test_somebody_who_leaves_is_not_missed():
+def test_a_person_who_leaves_is_not_missed():
     truth, found = places(0.0, 2.0), places(0.0, 2.0)
     truth[10:, 1] = found[10:, 1] = np.nan
     assert identities(truth, found).mota == 1

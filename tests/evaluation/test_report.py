@@ -195,7 +195,7 @@ def test_odd_runs_make_pages(tmp_path, kind):
     assert "nan mm" not in text
     assert "No pictures: the run has no overlay.mp4, and its recording, nowhere, is not there." in text
     if kind == "other_world":
-        assert "all errors are told after that" in text
+        assert "all errors are stated after that" in text
     if kind == "sync":
         assert "-0.4" in text
 

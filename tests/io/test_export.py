@@ -193,7 +193,7 @@ def test_what_cannot_be_exported_is_said(shell, whole, tmp_path):
     assert "sizes: found those of the body 'rounded'" in refused(shell, "export", other, "--to", "glb")
 
 
-def test_a_person_measured_anew_is_said(tmp_path, whole):
+def test_a_person_measured_again_is_said(tmp_path, whole):
     folder = tmp_path / "run"
     shutil.copytree(whole, folder)
     text = (folder / "person.toml").read_text()
@@ -217,7 +217,7 @@ def test_joints_become_any_other_file(shell, whole, tmp_path, target):
     assert f"made{target}" in out
     motion = read_run(whole).motion
     if target in (".bvh", ".glb", ".mot", ".osim"):
-        assert "a body's poses fitted to 17 joints, 25 frames" in out
+        assert "a body's poses fitted to 21 joints, 25 frames" in out
     if target == ".bvh":
         found = read_bvh(tmp_path / "made.bvh").joints().select(motion.joint_names).positions @ Y_UP
         assert np.sqrt(((found - motion.joints) ** 2).sum(2).mean()) < 0.02

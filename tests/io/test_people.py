@@ -7,7 +7,8 @@ import pytest
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.people import PEOPLE, person_folder, person_folders, read_places, write_header, write_place
-from shadowpuppet.io.run import RunWriter, read_run
+from shadowpuppet.io.run import read_run
+from shadowpuppet.io.run_writer import RunWriter
 
 JOINTS, DOFS = ["pelvis"], ["root_x"]
 

@@ -186,7 +186,7 @@ def test_a_mistake_in_recording_toml_is_said(one, text, words):
     said(notes(one, text), words, str(one))
 
 
-def test_where_films_begin_and_how_much_counts_is_told(two):
+def test_where_films_begin_and_how_much_counts_is_reported(two):
     found = read_recording(notes(two, "rate = 60\nduration = 9.75\n[start]\nright = 1.35\n"))
     assert (found.duration, [view.start for view in found.views]) == (9.75, [0.0, 1.35])
     notes(two, "")

@@ -20,7 +20,8 @@ from hypothesis import strategies as st
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.intervals import IntervalWriter, read_intervals
 from shadowpuppet.io.motion.table import read_joints, read_raw
-from shadowpuppet.io.run import RunWriter, read_run, write_metrics
+from shadowpuppet.io.run import read_run
+from shadowpuppet.io.run_writer import RunWriter, write_metrics
 from shadowpuppet.motion.motion import STATUSES, Mode, Motion, MotionFrame
 
 DOFS, JOINTS = ("torso_y", "torso_bow"), ("neck", "left_hand")
@@ -338,7 +339,7 @@ def without_last_line(path: Path) -> None:
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
 
 
-def test_a_recording_is_told_from_a_run(tmp_path):
+def test_a_recording_is_reported_from_a_run(tmp_path):
     (tmp_path / "lab" / "video").mkdir(parents=True)
     with pytest.raises(FormatError, match=r"lab: found no run\.toml in it, .*; it is a recording: track it first \(shadowpuppet track "):
         read_run(tmp_path / "lab")
@@ -520,7 +521,7 @@ def test_a_revision_that_cannot_be_written_leaves_the_tables(tmp_path, monkeypat
         with writer(tmp_path / "run") as run:
             for i in range(3):
                 run.write(a_frame(i))
-            monkeypatch.setattr("shadowpuppet.io.run.run_rows", full)
+            monkeypatch.setattr("shadowpuppet.io.run_writer.run_rows", full)
             run.revise(run.motion)
 
     with pytest.raises(ShadowPuppetError, match=r"the 3 frames so far are in joints\.csv"):

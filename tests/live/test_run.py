@@ -117,7 +117,8 @@ def test_the_folder_tells_how_it_was_made_and_keeps_no_picture(played, film):
 
 def test_what_is_said_and_shown(played):
     run, _, out, err = played
-    for line in ("step out of the picture: 1", "stay out: the empty scene is learnt: 1", "measuring: one moment", "tracking"):
+    for line in ("step out of the picture, or stay and move: 1", "stay out, or keep moving: finding the empty scene: 1",
+                 "measuring: one moment", "tracking"):
         assert line in err.splitlines()
     for word in ("latency", "from capture to pose", "frames/s of 15", "dropped", str(run.folder / "joints.csv")[-20:]):
         assert word in out.replace("\n", "")
@@ -138,11 +139,24 @@ def test_what_was_recorded_can_be_tracked_again_and_a_background_file_is_taken_i
     assert np.median(np.abs(again.joints[:, neck] - motion.joints[:, neck])) < 0.15
 
 
+def test_a_film_without_an_empty_scene_is_tracked_after_its_first_seconds_by_its_name_alone(pictures, tmp_path, capsys):
+    """Nobody steps out of the picture or stands still, and no picture is lost while the person is measured."""
+    film = tmp_path / "film.mp4"
+    made.write_film(film, [*pictures[1][40:], *pictures[1][:39:-1], *pictures[1][40:]], RATE)
+    given = ["--height", HEIGHT, "--fov", FOV, "--show", "none", "--learn", "1.5", "-o", tmp_path / "run", *FLAGS]
+    assert cli.run(["live", *map(str, [film, *given])]) == 0
+    run = read_run(tmp_path / "run")
+    assert run.motion.times[0] < 2.0
+    assert run.motion.status_counts["tracked"] > 0.8 * len(run.motion)
+    assert "step out" not in capsys.readouterr().err
+    assert cli.run(["live", str(film), "--camera", "0"]) == 2
+
+
 def test_a_film_with_nobody_in_it_leaves_nothing(pictures, tmp_path, capsys):
     made.write_film(tmp_path / "empty.mp4", pictures[0], RATE)
     assert cli.run(command(tmp_path / "empty.mp4", tmp_path / "run", "--speed", "2")) == 0
     err = capsys.readouterr().err
-    assert "nobody was tracked: nothing was written; a film that ends before" in err
+    assert "nobody was tracked: nothing was written; the film ended before" in err
     assert f"`track {tmp_path / 'empty.mp4'}` follows the person in all of it" in err
     assert not (tmp_path / "run").exists()
 
@@ -341,7 +355,7 @@ def test_a_camera_that_is_unplugged_is_said_once_and_taken_up_again(pictures, tm
     [trouble] = heard.troubles  # of a slow machine the first that is noticed may be that it cannot be opened again
     assert trouble in ("cam: gives no more pictures (it is tried again)", "cam: gives no picture (it is tried again)")
     broken = next(n for n, view in enumerate(views) if view.trouble)
-    assert {view.phase for view in views[broken:]} == {"tracking"}  # nobody had to be found anew
+    assert {view.phase for view in views[broken:]} == {"tracking"}  # nobody had to be found again
     assert {view.chip for view in views[broken:] if view.trouble} == {"paused"}
     assert opened == [0, 1, 2, 3]
     run = read_run(tmp_path / "run")

@@ -148,7 +148,7 @@ def test_left_is_left_and_forward_is_forward():
     assert hanging["LeftFoot"][1] < hanging["Hips"][1] < hanging["Head"][1]
 
 
-def test_whoever_stands_before_one_camera_looks_along_z_with_feet_on_the_floor():
+def test_who_stands_before_one_camera_looks_along_z_with_feet_on_the_floor():
     who = subject("rounded")
     found = composed(heard(who, posed(who, torso_y=0.2)))
     assert found["Hips"] == pytest.approx([-0.2, who.pelvis_height, 0], abs=1e-6)  # a step to their left
@@ -262,7 +262,7 @@ def served(*origins):
         yield outlet, f"ws://127.0.0.1:{outlet.port}/"
 
 
-def test_a_program_gets_the_beginning_and_then_frames_and_is_told_goodbye():
+def test_a_program_gets_the_beginning_and_then_frames_and_is_reported_goodbye():
     who = subject()
     with served() as (outlet, url), connect(url) as early:
         outlet.begin(who)
@@ -319,7 +319,7 @@ def test_a_name_that_another_site_turned_to_this_machine_and_two_hosts_are_refus
         assert outlet.counts()["refused"] == 1
 
 
-def test_whoever_is_slow_gets_the_newest_frame_and_holds_nobody_up():
+def test_who_is_slow_gets_the_newest_frame_and_holds_nobody_up():
     who, number = subject("anatomical"), 1500
     told = posed(who)
     with served() as (outlet, url), raw_listener(outlet.port) as slow, connect(url) as quick:
@@ -338,7 +338,7 @@ def test_whoever_is_slow_gets_the_newest_frame_and_holds_nobody_up():
         assert len(seen) > 40
 
 
-def test_whoever_hangs_does_not_hold_up_the_end():
+def test_who_hangs_does_not_hold_up_the_end():
     who = subject("anatomical")
     outlet = WebSocketOutlet("127.0.0.1", 0)
     with outlet, raw_listener(outlet.port):
@@ -461,7 +461,7 @@ class FakeInfo:
         return self
 
 
-def test_a_stream_is_made_anew_only_for_other_joints(monkeypatch):
+def test_a_stream_is_made_again_only_for_other_joints(monkeypatch):
     FakeStream.made.clear()
     fake = types.SimpleNamespace(StreamInfo=FakeInfo, StreamOutlet=FakeStream, IRREGULAR_RATE=0.0, local_clock=lambda: 50.0)
     monkeypatch.setitem(sys.modules, "pylsl", fake)
@@ -473,7 +473,7 @@ def test_a_stream_is_made_anew_only_for_other_joints(monkeypatch):
             outlets.begin(who)
             outlets.send(posed(who)._replace(age=0.5))
     assert [len(stream.samples) for stream in FakeStream.made] == [2, 1]
-    assert [stream.info.told[2] for stream in FakeStream.made] == [7 * 12, 7 * 18]
+    assert [stream.info.told[2] for stream in FakeStream.made] == [7 * 12, 7 * 22]
     assert FakeStream.made[0].samples[0][1] == 49.5
     assert outlets.trouble() == ""
 

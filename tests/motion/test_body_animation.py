@@ -39,13 +39,13 @@ def test_at_rest_a_person_stands_along_y_and_looks_along_z(name, rng):
     assert at["left_hand"][1] < at["left_elbow"][1] < at["left_shoulder"][1]
     assert set(animation.ends) == {n for n in range(len(animation.names)) if n not in animation.parents}
     if name == "anatomical":
-        _, y, z = animation.ends[animation.names.index("left_ankle")]
-        assert z > 0.12  # toes point forward
-        assert y < 0
+        assert at["left_toe"][2] > at["left_ankle"][2] + 0.12  # toes point forward
+        assert at["left_heel"][1] < at["left_ankle"][1]
     crown = at["head"] + animation.ends[animation.names.index("head")]
     top = 1.78 if "left_ankle" in at else 0
     if top:
-        soles = min(at[joint][1] + animation.ends[animation.names.index(joint)][1] for joint in ("left_ankle", "right_ankle"))
+        ends = [at[animation.names[n]][1] + end[1] for n, end in animation.ends.items()]
+        soles = min(ends)
         assert crown[1] - soles == pytest.approx(top, abs=0.06)
 
 
@@ -65,7 +65,7 @@ def test_a_runs_frame_in_the_world_is_found_from_its_joints(tmp_path, name):
     np.testing.assert_allclose(animation.table.select(motion.joint_names).positions, motion.joints, atol=1e-12)
 
 
-def test_of_a_person_who_was_measured_anew_each_frame_is_placed_for_itself(tmp_path):
+def test_of_a_person_who_was_measured_again_each_frame_is_placed_for_itself(tmp_path):
     motion = read_run(runs.make_run(tmp_path / "run", "rounded")).motion
     shifted = motion.joints.copy()
     shifted[20:] += [0.0, 0.4, 0.0]  # the distance was found to be another

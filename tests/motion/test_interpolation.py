@@ -25,7 +25,7 @@ def test_missing_frames_are_places_without_a_frame():
     np.testing.assert_allclose(found.times, np.arange(50) / 25, atol=1e-12)
 
 
-def test_frames_that_lie_between_are_to_be_found_anew():
+def test_frames_that_lie_between_are_to_be_found_again():
     times = np.cumsum(np.random.default_rng(3).uniform(0.02, 0.08, 60))
     found = uniform_sampling(times)
     assert found.frames is None

@@ -102,7 +102,7 @@ def test_an_offset_is_found_whatever_the_world_and_the_rate(offset, rate, seed, 
     assert found.rival is None
 
 
-def test_a_motion_that_repeats_itself_is_told():
+def test_a_motion_that_repeats_itself_is_reported():
     times = np.arange(0, 12, 1 / 30)
     swing = np.sin(2 * np.pi * times)[:, None, None] * np.array([0.3, 0.1, 0]) + 0.2 * np.sin(4 * np.pi * times + 1)[:, None, None]
     table = JointTable(times, ("left_wrist",), swing)
@@ -117,6 +117,6 @@ def test_a_motion_that_repeats_itself_is_told():
     (person(0.1), person(0.1), "share fewer than"),
     (line(np.arange(0, 5, 0.1)), line(np.arange(0, 5, 0.1)), "none stands out; give --offset"),
 ])
-def test_where_no_offset_can_be_told_that_is_said(run, truth, said):
+def test_where_no_offset_can_be_reported_that_is_said(run, truth, said):
     with pytest.raises(ShadowPuppetError, match=said):
         find_offset(run, truth)

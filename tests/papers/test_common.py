@@ -125,7 +125,7 @@ def test_pictures_grow_no_larger_than_the_documentation_takes(tmp_path, monkeypa
     assert (tmp_path / "small.png").stat().st_size <= 40_000
 
 
-def test_a_picture_that_cannot_be_written_is_told(tmp_path):
+def test_a_picture_that_cannot_be_written_is_reported(tmp_path):
     (tmp_path / "file").write_text("")
     for folder, why in (("nowhere", "no such file or directory"), ("file", "not a directory")):
         with pytest.raises(ShadowPuppetError, match=rf"{folder}.*cannot be written \({why}\)"):
@@ -140,12 +140,12 @@ def test_jobs_come_back_in_their_order(workers):
     assert run_all("jobs", twice, range(6), workers) == [0, 2, 4, 6, 8, 10]
 
 
-def test_a_task_that_refuses_is_told_as_it_is():
+def test_a_task_that_refuses_is_reported_as_it_is():
     with pytest.raises(ShadowPuppetError, match=r"job [01]: found nothing"):
         run_all("jobs", refused, range(2), 2)
 
 
-def test_a_killed_process_is_told_in_a_sentence():
+def test_a_killed_process_is_reported_in_a_sentence():
     with pytest.raises(ShadowPuppetError, match="jobs: a process was killed"):
         run_all("jobs", killed, range(5), 2)
     assert run_all("jobs", twice, range(2), 2) == [0, 2]  # others are started
@@ -206,7 +206,7 @@ def test_mistakes_end_with_code_2_and_a_sentence(arguments, said, capsys):
     assert said in capsys.readouterr().err
 
 
-def test_a_folder_that_cannot_be_made_is_told(tmp_path, capsys):
+def test_a_folder_that_cannot_be_made_is_reported(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert main("tests", "About.", EXPERIMENTS, ["tried", "-o", str(tmp_path / "file" / "out")]) == 2
     assert "cannot be made" in capsys.readouterr().err
@@ -248,7 +248,7 @@ def test_the_page_is_built_of_results_and_keeps_what_is_not_named(tmp_path, docs
     assert "mean little" not in page
 
 
-def test_short_results_are_told_as_such(tmp_path, docs):
+def test_short_results_are_reported_as_such(tmp_path, docs):
     assert reproduction.main([str(results(tmp_path / "a", 1, short=True)), "--docs", str(docs)]) == 0
     assert "mean little" in (docs / "reproduction.md").read_text("utf-8")
 
@@ -268,7 +268,7 @@ def test_spoilt_results_leave_the_page_alone(tmp_path, docs, spoil, said, capsys
     assert (docs / "reproduction.md").read_text("utf-8") == PAGE
 
 
-def test_a_page_without_a_place_is_told(tmp_path, docs, capsys):
+def test_a_page_without_a_place_is_reported(tmp_path, docs, capsys):
     (docs / "reproduction.md").write_text("# Page\n")
     assert reproduction.main([str(results(tmp_path / "a", 1)), "--docs", str(docs)]) == 2
     assert "expected a line <!-- tests -->" in capsys.readouterr().err

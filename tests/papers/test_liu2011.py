@@ -148,14 +148,14 @@ def test_given_recordings_are_taken_and_need_a_truth_for_3d_errors(out, tmp_path
 
 @pytest.mark.parametrize(("arguments", "said"), [(["figure_13"], "'figure_13', expected one of figure_1_2, figure_3_4"),
                                                  (["figure_8", "--silhouettes", "best"], "invalid choice: 'best'")])
-def test_mistakes_are_told(arguments, said, capsys):
+def test_mistakes_are_reported(arguments, said, capsys):
     with pytest.raises(SystemExit) as ended:
         run(arguments)
     assert ended.value.code == 2
     assert said in capsys.readouterr().err
 
 
-def test_a_recording_that_is_none_is_told(tmp_path, capsys):
+def test_a_recording_that_is_none_is_reported(tmp_path, capsys):
     assert run(["figure_8", "--recording", str(tmp_path / "none"), "-o", str(tmp_path / "out")]) == 2
     assert capsys.readouterr().err.startswith("error: ")
 
@@ -185,7 +185,7 @@ def test_3d_errors_decide_on_elbows_hands_and_their_order():
     assert judged(errors(0.06, 0.1), overlap=0.4)[4] is False
 
 
-def test_gains_are_told_motion_by_motion():
+def test_gains_are_reported_motion_by_motion():
     case: Any = SimpleNamespace(name="lab", times=np.arange(4.0), parts=(material.Part("wave", 0, 1), material.Part("bow", 2, 3)))
     of = errors(0.06, 0.1)
     of["DRS"][:, 2:] += 0.09
@@ -351,7 +351,7 @@ def test_methods_change_only_what_they_name():
     assert (shared.torso.sigma_cost, shared.arm.sigma_cost, shared.resampling) == (4000, 2000, "stratified")
 
 
-def test_a_folder_that_runs_cannot_be_kept_in_is_told(request_, tmp_path):
+def test_a_folder_that_runs_cannot_be_kept_in_is_reported(request_, tmp_path):
     case = material.cases(request_)[0]
     (tmp_path / "runs").write_text("")
     with pytest.raises(ShadowPuppetError, match=r"cannot be written"):

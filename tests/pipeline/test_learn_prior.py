@@ -76,7 +76,7 @@ def test_mistakes_are_said(motions, tmp_path, capsys):
     assert not out.exists()
 
 
-def test_a_run_is_told_of_a_prior_and_how_to_learn(tmp_path):
+def test_a_run_is_reported_of_a_prior_and_how_to_learn(tmp_path):
     (tmp_path / "mine.toml").write_text('prior = "walk.npz"\n[training]\nregions = 7\nmirrored = true\n')
     options = make_options(read_options(tmp_path / "mine.toml"))
     assert options.prior == tmp_path / "walk.npz"

@@ -16,7 +16,8 @@ from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import DEEP, _doubts, _forearms_seen, wrong_posture
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import clean_silhouettes, learn_silhouettes, read_masks
-from shadowpuppet.pipeline.survey import _look, quality_of, survey_film
+from shadowpuppet.pipeline.survey.camera import _look
+from shadowpuppet.pipeline.survey.film import quality_of, survey_film
 from shadowpuppet.pipeline.track import MONOCULAR, Prepared, json_text, look_at, prepare, track_recording
 from shadowpuppet.silhouette.quality import mask_quality
 from shadowpuppet.tracking.monocular.initialization import POSTURES, PersonEstimate, SizeFit, sizes_from_height
@@ -431,7 +432,7 @@ def test_a_distance_that_silhouettes_do_not_show_is_doubted():
     assert not _doubts(found_without_references(12, np.nan), "proportions", 0.85, 12)
 
 
-def test_somebody_who_is_elsewhere_in_many_moments_is_doubted():
+def test_a_person_who_is_elsewhere_in_many_moments_is_doubted():
     (doubt,) = _doubts(found_without_references(8, 0.8), "proportions", 0.2, 12)
     assert doubt.startswith("in 4 of 12 moments of the film the person is at another distance or height")
     assert not _doubts(found_without_references(10, 0.8), "proportions", 0.85, 12)

@@ -19,7 +19,7 @@ from shadowpuppet.pipeline.look import RigLook
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import json_text
 from shadowpuppet.pipeline.rig import open_rig
-from shadowpuppet.pipeline.survey import survey_rig
+from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.pipeline.track import look_at, track_recording
 
 MASKS = Options(masks=True)
@@ -77,7 +77,7 @@ def test_films_of_other_rates_and_lengths_are_doubted(spoilt):
     assert "[start] of recording.toml" in doubt
 
 
-def test_swapped_films_are_told(spoilt):
+def test_swapped_films_are_reported(spoilt):
     for kind, end in (("video", "mp4"), ("masks", "mkv"), ("background", "mp4")):
         a, b = (spoilt / kind / f"{name}.{end}" for name in ("cam1", "cam2"))
         shutil.move(a, spoilt / "x")

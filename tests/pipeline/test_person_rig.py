@@ -99,7 +99,7 @@ def test_a_recording_becomes_joints(run):
     assert run.info["settings"]["multiview"]["particles"] == 16
 
 
-def test_who_was_there_is_told_and_saved(run):
+def test_who_was_there_is_reported_and_saved(run):
     person = json.loads((folder_of(run) / "look.json").read_text())["person"]
     assert person["source"] == "training motion, and the hulls of the first seconds"
     assert person["overlap"] > 0.85

@@ -13,7 +13,7 @@ import pytest
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.checkpoint import FRAMES, STATE
 from shadowpuppet.io.files.lock import LOCK
-from shadowpuppet.io.run import CompleteRun
+from shadowpuppet.io.run_writer import CompleteRun
 from shadowpuppet.pipeline import track as module
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.progress import Listener

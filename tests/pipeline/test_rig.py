@@ -12,9 +12,9 @@ from solids import looking
 
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, SilhouetteError
 from shadowpuppet.io.recording import Recording, View
-from shadowpuppet.pipeline.check_calibration import check_calibration
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, chosen_views, cut, spread_frames, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
+from shadowpuppet.pipeline.repair.films import check_calibration
 from shadowpuppet.pipeline.rig import LATE, Rig, open_rig, read_frames, synchronized_frames
 from shadowpuppet.video import write_frames
 
@@ -110,7 +110,7 @@ def test_of_two_rates_the_slower_one_counts(tmp_path):
     assert numbers(rig(tmp_path, steady(12, 20.0), steady(6))) == [(2 * n, n) for n in range(6)]
 
 
-def test_films_that_began_at_other_times_are_told_so(tmp_path):
+def test_films_that_began_at_other_times_are_reported_so(tmp_path):
     made = rig(tmp_path, steady(10), steady(10), starts=(0.3, 0.0))
     assert numbers(made)[:7] == [(n + 3, n) for n in range(7)]
 
@@ -149,7 +149,7 @@ def of_recording(made: Rig, recording: Recording) -> Rig:
     return Rig(recording, tuple(Footage(recording, each.view, each.camera) for each in made.footage))
 
 
-def test_how_many_sets_there_are_is_told_where_films_tell_it(tmp_path):
+def test_how_many_sets_there_are_is_reported_where_films_tell_it(tmp_path):
     """Matroska does not."""
     made = rig(tmp_path, steady(10), steady(12), steady(20, 20.0), starts=(0.0, 0.3, 0.0), suffix=".mp4")
     assert [footage.count for footage in made.footage] == [10, 9, 20]

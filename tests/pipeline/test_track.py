@@ -272,7 +272,7 @@ def test_ready_masks_are_cut_to_the_region(recording):
     np.testing.assert_array_equal(seen(shot)[:, :80], whole(shot)[:, :80])
 
 
-def test_a_region_is_told_in_pixels_of_the_film(recording):
+def test_a_region_is_reported_in_pixels_of_the_film(recording):
     footage = open_footage(recording, Options(max_size=80, region=(40, 20, 120, 100)))
     assert footage.region == (slice(10, 50), slice(20, 60))
 
@@ -314,7 +314,7 @@ def test_a_film_of_a_posture_serves_as_its_reference(recording, tmp_path):
 def test_a_truth_that_cannot_be_used_does_not_cost_the_run(recording, tmp_path):
     spoilt = made.copied(recording, tmp_path / "spoilt", without=["truth.trc"])
     made.replace_text(spoilt / "truth.csv", "left_hand_x", "left_hand_q")
-    with pytest.warns(ShadowPuppetWarning, match=r"no errors are told: .*truth.csv"):
+    with pytest.warns(ShadowPuppetWarning, match=r"no errors are computed: .*truth.csv"):
         result = track_recording(spoilt, tmp_path / "run", make_options(QUICK))
     assert "errors" not in result.metrics
     assert read_run(tmp_path / "run").complete

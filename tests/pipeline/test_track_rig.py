@@ -121,7 +121,7 @@ def test_a_subset_of_the_cameras_can_be_tracked(recording, tmp_path):
     assert read_run(summary.folder).info["cameras"] == ["cam1", "cam2", "cam4"]
 
 
-def test_somebody_who_leaves_is_absent_and_searched_for_when_they_come_back(tmp_path):
+def test_a_person_who_leaves_is_absent_and_searched_for_when_they_come_back(tmp_path):
     cameras = made_rig.cameras()
     seen = made_rig.masks(cameras)
     empty = [np.zeros_like(mask) for mask in seen[0]]

@@ -87,7 +87,7 @@ def test_silhouettes_in_which_nothing_moves_are_nobody():
     assert found.mask[CHAIR].all()
 
 
-def test_a_person_who_hardly_moves_is_somebody():
+def test_a_person_who_hardly_moves_is_a_person():
     images, masks = film(chair=False)
     assert find_nobody(find_still(images, masks), masks) is None
 

@@ -62,7 +62,7 @@ def test_figures_stay_in_their_ranges(density, seed):
 
 
 @pytest.mark.parametrize(("side", "place"), [("left", {"x": 3}), ("right", {"x": 77}), ("top", {"y": 0})])
-def test_a_person_partly_outside_is_told(side, place):
+def test_a_person_partly_outside_is_reported(side, place):
     masks = [*walking(30), *[person(**place)] * 20]
     quality = mask_quality(masks)
     assert quality.border[side] == pytest.approx(20 / 50)
@@ -79,7 +79,7 @@ def test_legs_cut_by_the_lower_border_are_right_and_one_pixel_is_noise():
     assert quality.warnings() == ()
 
 
-def test_empty_frames_are_told_and_mostly_empty_films_refused():
+def test_empty_frames_are_reported_and_mostly_empty_films_refused():
     nobody = np.zeros(SIZE, bool)
     quality = mask_quality([*walking(30), nobody, nobody, *walking(18)])
     assert (quality.empty, quality.first_empty) == (2, 30)
@@ -91,7 +91,7 @@ def test_empty_frames_are_told_and_mostly_empty_films_refused():
     assert refused.warnings() == ()
 
 
-def test_full_frames_are_told_and_mostly_full_films_refused():
+def test_full_frames_are_reported_and_mostly_full_films_refused():
     everything = np.ones(SIZE, bool)
     quality = mask_quality([*walking(36), everything, everything, everything, everything])
     assert (quality.full, quality.first_full) == (4, 36)
@@ -146,7 +146,7 @@ def test_flicker_is_noise_and_not_motion(rng):
     assert mask_quality(jumping).flicker == 0
 
 
-def test_lost_parts_are_told():
+def test_lost_parts_are_reported():
     quality = mask_quality(person(height=30 if n % 10 else 15) for n in range(40))
     assert quality.area_jumps == pytest.approx(7 / 39)
     assert any("changes by over 25 % at once" in w for w in quality.warnings())
@@ -156,7 +156,7 @@ def test_lost_parts_are_told():
     assert any("changes by 10 % from frame to frame" in w for w in quality.warnings())
 
 
-def test_a_tiny_person_is_told():
+def test_a_tiny_person_is_reported():
     quality = mask_quality(person(50 + n, 50, 4, 12, (240, 320)) for n in range(5))
     assert any("0.062 % of the picture: too little to see limbs" in w for w in quality.warnings())
 

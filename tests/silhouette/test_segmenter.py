@@ -241,7 +241,7 @@ def test_pictures_that_do_not_fit_are_refused(rng):
         learn_background([[1, 2]])  # pyright: ignore[reportArgumentType]
 
 
-def test_no_background_is_told(rng):
+def test_no_background_is_reported(rng):
     with pytest.raises(SilhouetteError, match=r"found no frame.*film itself"):
         learn_background([])
 

@@ -97,7 +97,7 @@ def test_nothing_asked_is_nothing_changed(rng):
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["brightness", "colour", "both"]), st.sampled_from([0.5, 1.0]))
 @settings(max_examples=30, deadline=None)
-def test_what_is_told_at_once_is_what_every_pixel_tells(seed, key, darkest):
+def test_what_is_reported_at_once_is_what_every_pixel_tells(seed, key, darkest):
     """The box of sure background changes no label, and a pixel that is just the background is in it."""
     rng = np.random.default_rng(seed)
     _, _, mean, inverse_sigma = random_labels(rng, (24, 20))

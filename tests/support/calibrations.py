@@ -173,17 +173,52 @@ def colmap(made: Sequence[Camera]) -> tuple[str, str]:
     return "\n".join(lenses), "\n".join(pictures)
 
 
+def krt(made: Sequence[Camera]) -> str:
+    """Rows without names, a blank line after each camera."""
+    def row(values: np.ndarray) -> str:
+        return " ".join(repr(value) for value in values.tolist())
+
+    parts = [[camera.name, *map(row, camera.matrix), row(camera.distortion[:5]), *map(row, camera.T_camera_world[:3]), ""]
+             for camera in made]
+    return "\n".join(line for part in parts for line in part) + "\n"
+
+
+def biocv(camera: Camera) -> str:
+    """BioCV's .calib: blank lines between its parts, millimetres."""
+    T = camera.T_camera_world.copy()
+    T[:3, 3] *= 1000
+    parts = [np.array([[camera.size[0]], [camera.size[1]]]), camera.matrix, T, camera.distortion[None, :5]]
+    return "\n\n".join("\n".join(" ".join(map(repr, row)) for row in part.tolist()) for part in parts) + "\n"
+
+
+def kalibr(made: Sequence[Camera], model: str = "pinhole", distortion: str = "radtan") -> str:
+    """Kalibr's camchain.yaml; each camera's place is relative to the one before."""
+    parts = []
+    for n, camera in enumerate(made):
+        parts.append(f"cam{n}:\n")
+        if n:
+            rows = (camera.T_camera_world @ np.linalg.inv(made[n - 1].T_camera_world)).tolist()
+            parts.append("  T_cn_cnm1:\n" + "".join(f"  - {row}\n" for row in rows))
+        K = camera.matrix.tolist()
+        parts.append(f"  cam_overlaps: [{(n + 1) % len(made)}]\n  camera_model: {model}\n"
+                     f"  distortion_coeffs: {camera.distortion[:4].tolist()}\n  distortion_model: {distortion}\n"
+                     f"  intrinsics: {[K[0][0], K[1][1], K[0][2], K[1][2]]}\n  resolution: {list(camera.size)}\n"
+                     f"  rostopic: /cam{n}/image\n")
+    return "".join(parts)
+
+
 def write_all(folder: Path, made: Sequence[Camera]) -> dict[str, Path]:
     """Write a file of every kind; returns the path of each by its name."""
     texts = {"anipose.toml": toml(made), "freemocap.toml": freemocap(made), "camera_array.toml": caliscope(made),
              "panoptic.json": panoptic(made), "colmap/cameras.txt": colmap(made)[0], "colmap/images.txt": colmap(made)[1],
-             "Calib.qca.txt": qualisys(made), "session.xcp": vicon(made), "easy/intri.yml": intri(made), "easy/extri.yml": extri(made)}
+             "Calib.qca.txt": qualisys(made), "KRT": krt(made), "camchain.yaml": kalibr(made),
+             "session.xcp": vicon(made), "easy/intri.yml": intri(made), "easy/extri.yml": extri(made)}
     for camera in made:
         texts |= {f"cal/{camera.name}.cal": cal(camera), f"yaml/{camera.name}.yml": opencv(camera)}
-        texts |= {f"xml/{camera.name}.xml": opencv_xml(camera)}
+        texts |= {f"xml/{camera.name}.xml": opencv_xml(camera), f"biocv/{camera.name}.mp4.calib": biocv(camera)}
     for name, text in texts.items():
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text)
     (folder / "cameraIntrinsicsExtrinsics.pickle").write_bytes(pickle.dumps({"intrinsicMat": [1]}))
-    whole = {"easy": folder / "easy", "colmap": folder / "colmap", "cal": folder / "cal", "yaml": folder / "yaml", "xml": folder / "xml"}
+    whole = {name: folder / name for name in ("easy", "colmap", "cal", "yaml", "xml", "biocv")}
     return whole | {name: folder / name for name in texts if "/" not in name}

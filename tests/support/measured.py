@@ -8,7 +8,7 @@ import numpy as np
 
 from shadowpuppet.evaluation.evaluation import Comparison, measure_run
 from shadowpuppet.evaluation.joint_angles import compared_poses, turn_errors
-from shadowpuppet.io.run import RunWriter
+from shadowpuppet.io.run_writer import RunWriter
 from shadowpuppet.motion.metrics import GROUPS
 from shadowpuppet.motion.motion import JointTable, MotionFrame
 

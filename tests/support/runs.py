@@ -10,7 +10,7 @@ from shadowpuppet.body.models import MODELS, average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array, rigid, rotation_about
 from shadowpuppet.io.person import Person, write_person
-from shadowpuppet.io.run import RunWriter
+from shadowpuppet.io.run_writer import RunWriter
 from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import MotionFrame
 

@@ -443,7 +443,7 @@ def test_several_cameras_see_the_same_motion(tmp_path):
         assert 0.03 < min(area) < max(area) < 0.4
 
 
-def test_what_is_told_of_the_subject(tmp_path):
+def test_what_is_reported_of_the_subject(tmp_path):
     told = {"height": (1.75, None), "distance": (None, 2.0), "nothing": (None, None)}
     for tells, (height, distance) in told.items():
         spec = small(tells=tells, rate=1, motion=(Gesture(motion="stand", seconds=2),))
@@ -451,7 +451,7 @@ def test_what_is_told_of_the_subject(tmp_path):
         assert (subject.height, subject.distance) == (height, distance)
 
 
-def test_a_folder_that_cannot_be_made_is_told(tmp_path):
+def test_a_folder_that_cannot_be_made_is_reported(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(RecordingError, match=r"file: the recording cannot be written there"):
         synthesize(small(), tmp_path / "file", np.random.default_rng(0))
@@ -482,7 +482,7 @@ def test_spec_of_plain_values():
     ({"rate": "fast"}, r"rate: .*found 'fast'"),
     ({"scene": {"noise": -1}}, r"scene\.noise: .*found -1"),
 ])
-def test_a_bad_spec_is_told_in_one_sentence(values, told):
+def test_a_bad_spec_is_reported_in_one_sentence(values, told):
     with pytest.raises(SettingsError, match=told) as caught:
         spec_from(values)
     assert "\n" not in str(caught.value)

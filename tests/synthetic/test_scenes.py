@@ -111,7 +111,7 @@ def test_a_perfect_ring_is_evenly_spread_and_looks_at_the_middle(count, radius, 
 
 @given(jitter=st.floats(0.05, 1), seed=st.integers(0, 1000))
 @settings(max_examples=30, deadline=None)
-def test_a_rings_cameras_stray_as_far_as_told_and_no_farther(jitter, seed):
+def test_a_rings_cameras_stray_as_far_as_asked_and_no_farther(jitter, seed):
     ring = Ring(count=6, jitter=jitter, seed=seed)
     views, perfect = ring.views(1.75), replace(ring, jitter=0).views(1.75)
     for view, wanted in zip(views, perfect):
@@ -141,7 +141,7 @@ def test_roll_turns_the_picture_and_yaw_moves_it():
 
 @given(fov=st.floats(20, 110), k=st.tuples(*[st.floats(-0.004, 0.004)] * 4))
 @settings(max_examples=30, deadline=None)
-def test_a_fisheyes_picture_is_as_wide_as_told_and_its_rays_lead_back(fov, k):
+def test_a_fisheyes_picture_is_as_wide_as_asked_and_its_rays_lead_back(fov, k):
     view = Viewpoint(size=(64, 48), fov_deg=fov, fisheye=True)
     camera = view.camera()
     edge = camera.rays([(view.size[0] - 1) / 2 + view.size[0] / 2, (view.size[1] - 1) / 2])
@@ -301,7 +301,7 @@ def test_which_obstacles_are_there():
     assert [now.things for now in Furniture([always]).arrangements()] == [(always,)]
 
 
-def test_a_scaled_obstacle_is_as_large_as_told():
+def test_a_scaled_obstacle_is_as_large_as_asked():
     down, high = np.array([0.0, 0.0, -1.0]), np.array([0.0, -0.8, 3.0])
     for scale in (0.5, 1.0, 1.5):
         away = Furniture([Obstacle(kind="table", ahead=0.8, scale=scale)]).intersect(high, down[None])[0][0]
@@ -332,7 +332,7 @@ def test_the_chair_under_a_seated_person_is_where_they_sit(tmp_path):
 # Other people
 
 
-def test_somebody_behind_takes_nothing_and_is_in_the_mask_of_all():
+def test_a_person_behind_takes_nothing_and_is_in_the_mask_of_all():
     someone = Bystander(kind="man", ahead=-0.9, left=0.6)
     other = standing(bystander_body(someone), someone.left, someone.ahead, **gestures.HANGING_ARMS)
     spec = with_scene(bystanders=(someone,), shadow=0)
@@ -351,7 +351,7 @@ def test_somebody_behind_takes_nothing_and_is_in_the_mask_of_all():
     assert differs[added].mean() > 0.7
 
 
-def test_somebody_in_front_hides_the_person():
+def test_a_person_in_front_hides_the_person():
     someone = Bystander(kind="woman", ahead=0.8, left=0.3)
     other = standing(bystander_body(someone), someone.left, someone.ahead)
     alone, both = shot(SMALL, standing()), shot(with_scene(bystanders=(someone,)), standing(), others=(other,))
@@ -420,7 +420,7 @@ def test_pictures_are_the_same_whatever_the_number_of_threads_with_everything_in
         assert all(np.array_equal(x, y) for x, y in zip(a, b))
 
 
-def test_backgrounds_differ_as_told():
+def test_backgrounds_differ_as_asked():
     def roughness(kind):
         studio = SceneRenderer(with_scene(background=kind, room=5), replace(VIEW, size=(160, 120)).camera(), np.random.default_rng(0))
         grey = studio.room.pictures[0].mean(-1)
@@ -503,13 +503,13 @@ def test_a_half_covered_pixel_counts_at_its_neighbours_depth():
     np.testing.assert_array_equal(reach[0], [2, 2, 2, FAR, FAR])
 
 
-def test_a_camera_that_sees_nobody_is_told(tmp_path):
+def test_a_camera_that_sees_nobody_is_reported(tmp_path):
     aside = replace(VIEW, fov_deg=30.0, yaw_deg=60.0)
     with pytest.warns(ShadowPuppetWarning, match="camera 'cam': sees nothing of the person in any picture"):
         synthesize(replace(SMALL, rate=1, cameras=(aside,)), tmp_path, np.random.default_rng(0))
 
 
-def test_obstacles_that_hide_nothing_are_told(tmp_path):
+def test_obstacles_that_hide_nothing_are_reported(tmp_path):
     spec = with_scene(replace(SMALL, rate=1), obstacles=(Obstacle(kind="table", ahead=-2.0, left=2.0),))
     with pytest.warns(ShadowPuppetWarning, match="obstacles: nothing of the person is hidden"):
         synthesize(spec, tmp_path, np.random.default_rng(0))

@@ -155,7 +155,7 @@ def test_a_made_recording_can_be_made_again_from_its_spec(tmp_path):
     ("motion = [{motion = 'sit_down'}, {motion = 'walk'}]\n[[scene.obstacles]]\nkind = 'chair'\nseat = true",
      r"scene\.obstacles: found a seat and the motion walk"),
     ("[[scene.obstacles]]\nkind = 'pillar'\nahead = 2.0", r"scene\.obstacles: found a pillar where the camera 'cam' stands"),
-    ("[[scene.bystanders]]\nahead = 1.8\nleft = 0.1", r"scene\.bystanders: found somebody where the camera 'cam' stands"),
+    ("[[scene.bystanders]]\nahead = 1.8\nleft = 0.1", r"scene\.bystanders: found a person where the camera 'cam' stands"),
     ("[[scene.bystanders]]\nahead = 0.2\nleft = 0.1", r"scene\.bystanders\.0: ahead, left: found 0.2, 0.1, where the person stands"),
     ("[[scene.bystanders]]\nmotion = 'stand'", r"scene\.bystanders\.0\.motion: found 'stand', expected a table"),
     ("[[scene.bystanders]]\nmotion = { motion = 'fly' }", r"scene\.bystanders\.0\.motion\.motion: .*found 'fly'"),
@@ -180,7 +180,7 @@ def test_a_made_recording_can_be_made_again_from_its_spec(tmp_path):
     ("[scene]\ncrf = 60", r"scene\.crf: .*less than or equal to 51, found 60"),
     ("[scene]\nbackground = 'sea'", r"scene\.background: .*'room', 'plain', 'cluttered' or 'textured', found 'sea'"),
 ])  # fmt: skip
-def test_a_bad_spec_file_is_told_in_one_sentence(tmp_path, text, told):
+def test_a_bad_spec_file_is_reported_in_one_sentence(tmp_path, text, told):
     (tmp_path / "spec.toml").write_text(text)
     with pytest.raises(SettingsError, match=told) as caught:
         read_spec(tmp_path / "spec.toml")
@@ -210,7 +210,7 @@ def test_gestures_without_seconds_share_what_is_left(lengths, spare):
     ("reach 4, twist", 5, r"found 5 seconds, of which 1 gestures get 1 each, expected at least 2"),
     ("fly", None, r"motion\.0\.motion: .*found 'fly'"),
 ])  # fmt: skip
-def test_gestures_that_cannot_be_meant_are_told(text, seconds, told):
+def test_gestures_that_cannot_be_meant_are_reported(text, seconds, told):
     with pytest.raises(SettingsError, match=told):
         parse_gestures(text, seconds)
 
@@ -395,7 +395,7 @@ def test_what_cannot_be_meant_is_said_in_a_line(shell, tmp_path, tokens, said):
 # Folders
 
 
-def test_only_made_recordings_are_made_anew_unasked(shell, tmp_path):
+def test_only_made_recordings_are_made_again_unasked(shell, tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "video").mkdir()
     (tmp_path / "mine" / "video" / "cam.mp4").write_bytes(b"my only film")
@@ -410,7 +410,7 @@ def test_only_made_recordings_are_made_anew_unasked(shell, tmp_path):
     assert "file: found a file, expected a folder" in shell("-o", "file", *TINY)[2]
 
 
-def test_making_anew_leaves_nothing_of_the_old_and_all_that_is_the_users(tmp_path):
+def test_making_again_leaves_nothing_of_the_old_and_all_that_is_the_users(tmp_path):
     spec = replace(SMALL, rate=1)
     make_recording(spec, tmp_path)
     ring = replace(spec, cameras=(Viewpoint(),), ring=Ring(count=3, size=(48, 32)), scene=Scene(empty_seconds=1, bystanders=(Bystander(),)))
@@ -425,7 +425,7 @@ def test_making_anew_leaves_nothing_of_the_old_and_all_that_is_the_users(tmp_pat
                     "background/cam.mp4", "masks/cam.mkv"}  # fmt: skip
 
 
-def test_a_recording_that_was_interrupted_can_be_used_and_made_anew(tmp_path):
+def test_a_recording_that_was_interrupted_can_be_used_and_made_again(tmp_path):
     class Impatient(Listener):
         def advance(self, frames):
             if frames == 3:
@@ -439,13 +439,13 @@ def test_a_recording_that_was_interrupted_can_be_used_and_made_anew(tmp_path):
     assert len(frames(make_recording(SMALL, tmp_path).views[0].video)) == 8
 
 
-def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+def test_a_folder_that_cannot_be_written_is_reported(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(RecordingError, match="file"):
         make_recording(SMALL, tmp_path / "file" / "below")
 
 
-def test_somebody_passes_behind(shell, tmp_path):
+def test_a_person_passes_behind(shell, tmp_path):
     assert shell("-o", "two", "--second-person", "passing", "--distance", 3, "--quiet", *TINY)[0] == 0
     people, masks = (np.array(frames(tmp_path / "two" / kind / "cam.mkv")).max(-1) for kind in ("people", "masks"))
     middle = [np.flatnonzero(one.any(0)).mean() for one in people & ~masks if one.any()]
@@ -490,7 +490,7 @@ def test_a_film_may_show_a_part_of_the_motion():
     assert len(to_the_end) == len(times) - 60
 
 
-def test_a_film_longer_than_its_motion_is_told(tmp_path):
+def test_a_film_longer_than_its_motion_is_reported(tmp_path):
     spec = Spec(motion=parse_gestures("walk 4"), rate=10, begin=2, frames=40)
     with pytest.raises(SettingsError, match=r"frames: found 40 pictures at 10 a second after 2 s, expected at most 37"):
         perform(spec, np.random.default_rng(1))

@@ -33,6 +33,13 @@ def test_a_step_resamples_then_moves_then_weighs(rng):
     np.testing.assert_array_equal(after.log_weights, [-4, -9, -4])
 
 
+def test_ancestors_are_drawn_by_weight_not_by_cost(rng):
+    weights = np.array([-50.0, 0.0, -60.0])  # the second has nearly all weight, and the greatest cost
+    particles = Particles(np.array([[1.0], [2], [3]]), np.array([0.0, 9, 1]), weights)
+    after = step(rng, particles, resample=make_scheme("stratified", 0), propose=lambda _, poses: poses, weigh=weigh, number=50)
+    assert np.mean(after.poses == 2) > 0.9
+
+
 def test_the_best_pose_is_that_of_least_cost_whatever_the_weights():
     particles = Particles(np.array([[1.0, 1], [2, 2], [3, 3]]), np.array([5.0, 4, 6]), np.array([0.0, -9, -1]))
     np.testing.assert_array_equal(particles.best, [2, 2])

@@ -202,7 +202,7 @@ def test_cost_and_overlap_agree_with_their_definitions(rng):
 
 
 def test_kernels_are_compiled_once_for_arrays_that_are_contiguous(rng):
-    """Each kind of memory layout is compiled anew and runs slower: whatever a caller hands over, kernels get one kind."""
+    """Each kind of memory layout is compiled again and runs slower: whatever a caller hands over, kernels get one kind."""
     view = picture("cardbox")
     poses = random_poses(rng, view.body.skeleton, 8)
     observation = Observation.of(view.mask(poses[0]))

@@ -104,6 +104,44 @@ def test_frames_are_stamped_when_they_were_due_not_when_there_was_time():
     assert shots == pytest.approx([0, 0.05, 0, 0])
 
 
+def test_a_film_that_stood_still_goes_on_where_it_was_and_is_not_called_slow(recwarn):
+    clock, shots = Clock(), []
+    feed = film_feed(source([0.1 * i for i in range(6)]), clock=clock, wait=clock.wait)
+    for shot in feed.read():
+        shots.append(clock.now - shot.captured)
+        if len(shots) == 2:
+            clock.now += 30.0
+            feed.put_off(30.0)
+    assert shots == pytest.approx([0] * 6)
+    assert not recwarn
+
+
+def test_a_film_is_held_and_a_camera_is_not():
+    for live, expected in ((False, 0), (True, 3)):
+        shots = [Snapshot(0.1 * n, GREY, 0.1 * n) for n in range(3)]
+        said = list[float]()
+        end = threading.Event()
+
+        def read(shots=shots, end=end):
+            yield from shots
+            end.wait(10)
+
+        capture = Capture(Feed("film", (16, 12), 10.0, live, read, said.append))
+        capture.hold(True)
+        with capture:
+            time.sleep(0.3)
+            assert capture.newest.put_count == expected
+            capture.hold(False)
+            deadline = time.monotonic() + 10
+            while capture.newest.put_count < 3 and time.monotonic() < deadline:
+                time.sleep(0.01)
+            shot = capture.newest.take(1.0)
+            end.set()
+        assert shot is not None
+        assert bool(said) != live
+        assert capture.newest.put_count == 3
+
+
 def test_a_film_that_cannot_be_decoded_in_time_is_played_slower_and_that_is_said_once():
     clock, late = Clock(), []
 
@@ -201,7 +239,7 @@ def test_a_camera_s_pictures_are_stamped_as_they_come(monkeypatch, given_):
     assert (feed.name, feed.size, feed.rate, feed.live) == ("camera 1", (16, 12), 30.0, True)
     assert before <= shots[0].captured <= shots[1].captured <= shots[2].captured <= time.monotonic()
     assert [int(shot.image[0, 0, 0]) for shot in shots] == [92, 91, 90]
-    assert len(list(feed.read())) == 3  # opened anew
+    assert len(list(feed.read())) == 3  # opened again
 
 
 # Breaks

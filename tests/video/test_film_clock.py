@@ -26,7 +26,7 @@ def test_a_stutter_moves_one_time_only():
     np.testing.assert_allclose(times, [0, 0.1, 0.2, 0.25, 0.3, 0.4])
 
 
-def test_times_that_start_anew_go_on():
+def test_times_that_start_again_go_on():
     with pytest.warns(ShadowPuppetWarning):
         times = clocked([*range(20), 0, 3, 4])
     np.testing.assert_allclose(times, np.array([*range(21), 23, 24]) / 10)

@@ -8,5 +8,6 @@ BONES = (
     ("neck", "right_shoulder"), ("right_shoulder", "right_elbow"), ("right_elbow", "right_wrist"), ("right_wrist", "right_hand"),
     ("pelvis", "left_hip"), ("left_hip", "left_knee"), ("left_knee", "left_ankle"),
     ("pelvis", "right_hip"), ("right_hip", "right_knee"), ("right_knee", "right_ankle"),
+    ("left_ankle", "left_heel"), ("left_ankle", "left_toe"), ("right_ankle", "right_heel"), ("right_ankle", "right_toe"),
 )
 """Pairs of joints with a bone between them."""

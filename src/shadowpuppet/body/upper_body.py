@@ -18,6 +18,9 @@ from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.body.skeleton import SIDES, Coupling, Dof, Joint, Skeleton
 from shadowpuppet.geometry import Array
 
+TWIST, BEND = "torso_twist", "torso_bend"
+"""Degrees of freedom of the trunk: its turn about the vertical, and to the side."""
+
 
 def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
     """Joints and DOF of an arm, which hangs straight down, thumb forward, when all angles are zero.
@@ -52,9 +55,9 @@ def upper_body_skeleton(sizes: CardboxSizes, clavicles: bool = False) -> Skeleto
     joints = [Joint("pelvis", None), Joint("torso", "pelvis")]
     dofs = [
         Dof("torso_y", "pelvis", "y", kind="translation"),
-        Dof("torso_twist", "pelvis", "z", *np.radians([-90, 90]), spread=(0.7, 0.7)),
+        Dof(TWIST, "pelvis", "z", *np.radians([-90, 90]), spread=(0.7, 0.7)),
         Dof("torso_bow", "torso", "y", *np.radians([-10, 90]), spread=(0.06, 0.06)),
-        Dof("torso_bend", "torso", "x", *np.radians([-50, 50]), spread=(0.25, 0.25)),
+        Dof(BEND, "torso", "x", *np.radians([-50, 50]), spread=(0.25, 0.25)),
     ]
     for side in SIDES:
         arm_joints, arm_dofs = _arm(side, sizes)

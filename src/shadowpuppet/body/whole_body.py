@@ -155,7 +155,8 @@ def _drawn(limbs: Limbs) -> Hulls:
 
 
 def _landmarks(sizes: BoneSizes, neck: tuple[str, float]) -> dict[str, tuple[str, Three]]:
-    """The 17 joints that a motion reports. `neck`: the joint that carries the base of the neck, and the height (m) of that above it."""
+    """The 17 joints that every motion of a whole body reports. `neck`: the joint that carries the base of the neck, and the height (m) of
+    that above it."""
     points = {"pelvis": ("pelvis", (0.0, 0.0, 0.0)), "neck": (neck[0], (0.0, 0.0, neck[1])),
               "head": ("head", (sizes.head_forward, 0.0, sizes.neck_length))}  # fmt: skip
     for side in SIDES:
@@ -166,6 +167,30 @@ def _landmarks(sizes: BoneSizes, neck: tuple[str, float]) -> dict[str, tuple[str
         down = {"hip": ("hip", 0.0), "knee": ("knee", 0.0), "ankle": ("knee", sizes.shank_length)}
         points |= {f"{side}_{name}": (f"{side}_{joint}", (0.0, 0.0, -z)) for name, (joint, z) in down.items()}
     return points
+
+
+HEEL, TOE = -0.14, 0.72
+"""Places along the foot, as shares of its length before the ankle: below the heel bone, over which a foot rolls at contact; and below the
+tips of the toes."""
+HEEL_END, TOES_END = -0.14, 0.68
+"""First and last cross-section of the foot's shape, in the same shares."""
+
+
+def _soles(sizes: AnatomicalSizes) -> dict[str, tuple[str, Three]]:
+    """Heel and toe of both feet, on the sole, along the middle of the foot."""
+    points = dict[str, tuple[str, Three]]()
+    for side in SIDES:
+        (start, end), out = _toe_out(side, sizes), TOES_END - HEEL_END
+        for name, share in (("heel", HEEL), ("toe", TOE)):
+            aside = start + (end - start) * (share - HEEL_END) / out
+            points[f"{side}_{name}"] = (f"{side}_ankle", (share * sizes.foot_length, aside, -sizes.ankle_height))
+    return points
+
+
+def _toe_out(side: str, s: AnatomicalSizes) -> Pair:
+    """How far to the left (m) of the ankle the middle of the heel and of the toes lie: the flat foot is turned out about the ankle."""
+    out = s.toe_out if side == "left" else -s.toe_out
+    return -0.2 * out, out
 
 
 def _body(name: str, skeleton: Skeleton, parts: Sequence[_Limb], landmarks: dict[str, tuple[str, Three]]) -> Body:
@@ -211,19 +236,28 @@ def _arm(side: str, s: AnatomicalSizes) -> list[_Limb]:
     ]  # fmt: skip
 
 
+OUT_KNEE, OUT_ANKLE = 0.010, 0.017
+"""How far outside the line from knee to ankle the middle of the shank's shape lies, at the knee and at the ankle, as shares of the shank's
+length: the tibia lies on the inner side of the leg. The centroid of the shank's volume is 0.7 (men) to 3.1 % (women) outside (Dumas, Cheze
+and Verriest 2007, from McConville et al. 1980 and Young et al. 1983), and the ankle's centre 2 mm inside the middle of the malleoli. Within
+that, chosen on made recordings."""
+
+
 def _leg(side: str, s: AnatomicalSizes) -> list[_Limb]:
-    """A leg; the thigh lies in front of the bone, the calf behind it, and the toes of the flat foot are turned out."""
-    heel, toes, out = 0.45 * s.ankle_height, 0.22 * s.ankle_height, s.toe_out if side == "left" else -s.toe_out
+    """A leg; the thigh lies in front of the bone, the calf behind it and outside, and the toes of the flat foot are turned out."""
+    heel, toes, (heel_aside, toes_aside) = 0.45 * s.ankle_height, 0.22 * s.ankle_height, _toe_out(side, s)
+    outside = -1.0 if side == "left" else 1.0
     return [
         _Limb(f"{side}_thigh", f"{side}_hip", "down", (0.0, s.thigh_length),
               (_section(s.thigh_width, 1.09, 0.91), _section(s.knee_width, 1.03, 0.97)),
               (0.107 * s.thigh_width, 0.126 * s.knee_width), (0.4 * s.thigh_width, 0.4 * s.knee_width)),
         _Limb(f"{side}_shank", f"{side}_knee", "down", (0.0, s.shank_length),
               (_section(s.calf_width, 1.04, 0.96), _section(s.ankle_width, 1.12, 0.88)),
-              (-0.132 * s.calf_width, -0.182 * s.ankle_width), (0.3 * s.calf_width, 0.4 * s.ankle_width)),
-        _Limb(f"{side}_foot", f"{side}_ankle", "forward", (-0.14 * s.foot_length, 0.68 * s.foot_length),
+              (-0.132 * s.calf_width, -0.11 * s.ankle_width), (0.3 * s.calf_width, 0.4 * s.ankle_width),
+              (outside * OUT_KNEE * s.shank_length, outside * OUT_ANKLE * s.shank_length)),
+        _Limb(f"{side}_foot", f"{side}_ankle", "forward", (HEEL_END * s.foot_length, TOES_END * s.foot_length),
               ((heel, 0.38 * s.foot_width), (toes, 0.48 * s.foot_width)),
-              (heel - s.ankle_height, toes - s.ankle_height), (0.09 * s.foot_length, 0.09 * s.foot_length), (0.2 * out, -out)),
+              (heel - s.ankle_height, toes - s.ankle_height), (0.09 * s.foot_length, 0.09 * s.foot_length), (-heel_aside, -toes_aside)),
     ]  # fmt: skip
 
 
@@ -231,7 +265,8 @@ def anatomical(sizes: AnatomicalSizes) -> Body:
     """32 DOF, 17 tapered elliptic limbs. Tapers of arms and legs and their offsets from the bone are fractions of the widths, measured
     on a mesh of a person; the rest of the shape is our own."""
     sides = [limb for limbs in (_arm, _leg) for side in SIDES for limb in limbs(side, sizes)]
-    return _body("anatomical", anatomical_skeleton(sizes), [*_trunk(sizes), *sides], _landmarks(sizes, ("chest", sizes.thorax_height)))
+    return _body("anatomical", anatomical_skeleton(sizes), [*_trunk(sizes), *sides],
+                 _landmarks(sizes, ("chest", sizes.thorax_height)) | _soles(sizes))
 
 
 def cylinders(sizes: CylinderSizes) -> Body:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -34,14 +34,15 @@ SUBPIXEL = 4
 """Fractional bits of pixel coordinates in OpenCV's drawing."""
 
 
-def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLike, *, status: str, time: float,
-                  overlap: float = np.nan, ignore: ArrayLike | None = None, doubtful: Container[str] = ()) -> Image:
+def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLike, *, status: str, time: float, overlap: float = np.nan,
+                  ignore: ArrayLike | None = None, doubtful: Container[str] = (), last: tuple[ArrayLike, float] | None = None) -> Image:
     """The three rows (3 H, W, 3), blue green red, of a frame.
 
     Top: the model over the darkened picture, cards brighter the more they face the camera. Middle: where model and silhouette `mask` (H,
     W) agree (white) or differ, and ignored pixels, `ignore` (H, W), in greys. Bottom: the picture with the skeleton, the time (s),
-    the status and the overlap. A `pose` (D,) that is not finite is not drawn; shapes and bones whose names are `doubtful` are pale, and the
-    bones dashed. Raises `ShadowPuppetError` for a picture that is not of the camera's size.
+    the status and the overlap. Shapes and bones whose names are `doubtful` are pale, and the bones dashed. Where the `pose` (D,) is not
+    finite, the skeleton is that of the `last` pose that was, of a time (s), all pale. Raises `ShadowPuppetError` for a picture that is
+    not of the camera's size.
     """
     image, pose, mask = in_colour(image), np.asarray(pose, float), np.asarray(mask, bool)
     size = picture.camera.size
@@ -56,9 +57,16 @@ def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLi
     if known:
         draw_model(out[:height], picture, pose, doubtful)
         draw_skeleton(out[2 * height :], picture, pose, doubtful)
+    elif last is not None:
+        draw_skeleton(out[2 * height :], picture, np.asarray(last[0], float), picture.body.landmark_names)
     out[height : 2 * height] = matching(picture.mask(pose) if known else np.zeros_like(mask), mask, ignore)
-    _label(out, height, status, time, overlap)
+    _label(out, height, said_of(status, None if known or last is None else last[1]), time, overlap, ignore is not None)
     return out
+
+
+def said_of(status: str, last: float | None) -> str:
+    """A status in words; `last`: time (s) of the pose that is shown in place of the frame's own, None if that is shown."""
+    return status if last is None else f"{status}, pale: at {last:.2f} s"
 
 
 def matching(model: NDArray[np.bool_], mask: NDArray[np.bool_], ignore: ArrayLike | None = None) -> Image:
@@ -212,12 +220,23 @@ def _point(pixel: Array) -> tuple[int, int]:
     return x, y
 
 
-def _label(out: Image, height: int, status: str, time: float, overlap: float) -> None:
+LEGEND = (("left", SIDE_COLOURS["left"]), ("right", SIDE_COLOURS["right"]), ("pale: doubtful", PALE))
+"""What the model's colours are."""
+
+
+def _label(out: Image, height: int, status: str, time: float, overlap: float, ignores: bool) -> None:
     fit = "" if np.isnan(overlap) else f"  IoU {overlap:.2f}"
-    write_text(out, "best estimate", 0, WHITE)
-    end = write_text(out, "model only", height, MODEL_ONLY)
-    write_text(out, "silhouette only", height, SILHOUETTE_ONLY, end)
+    write_words(out, 0, (("best estimate", WHITE), *LEGEND))
+    left_out = (("left out", (150, 150, 150)),) if ignores else ()
+    write_words(out, height, (("model only", MODEL_ONLY), ("silhouette only", SILHOUETTE_ONLY), ("both", WHITE), *left_out))
     write_text(out, f"{time:.2f} s  {status}{fit}", 2 * height, WHITE)
+
+
+def write_words(out: Image, top: int, words: Iterable[tuple[str, Colour]], size: float | None = None) -> None:
+    """Write words in their colours beside each other below `top`, scaled as by `write_text`."""
+    end = 0
+    for text, colour in words:
+        end = write_text(out, text, top, colour, end, size)
 
 
 def write_text(out: Image, text: str, top: int, colour: tuple[int, int, int], left: int = 0, size: float | None = None) -> int:

@@ -83,4 +83,4 @@ def _tables(found: Mapping[str, Any]) -> Iterator[Any]:
 
 
 def _megabytes(value: float | None) -> str:
-    return "not told here" if value is None else f"{value:.1f} MB"
+    return "not known here" if value is None else f"{value:.1f} MB"

@@ -155,7 +155,7 @@ def _cache() -> Iterator[Finding]:
         yield Finding("compiled code", "missing", "NUMBA_DISABLE_JIT is set: nothing is compiled, which is very slow",
                       "unset NUMBA_DISABLE_JIT")  # fmt: skip
     elif not info or not _writable(Path(info)):
-        yield Finding("compiled code", "missing", f"cannot be kept{f' in {info}' if info else ''}: it is compiled anew at every start, "
+        yield Finding("compiled code", "missing", f"cannot be kept{f' in {info}' if info else ''}: it is compiled again at every start, "
                       "which takes up to half a minute", "set NUMBA_CACHE_DIR to a folder of your own that can be written")  # fmt: skip
     else:
         yield Finding("compiled code", "works", f"kept in {info}")

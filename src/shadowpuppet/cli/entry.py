@@ -55,6 +55,6 @@ def _run() -> int:
         if (cause.name or "").startswith("shadowpuppet"):
             raise  # a mistake of ours
         text = " ".join(str(cause).split())
-        print(f"error: a library cannot be loaded ({text}); `python -m pip install --force-reinstall shadowpuppet` gets them all anew",
+        print(f"error: a library cannot be loaded ({text}); `python -m pip install --force-reinstall shadowpuppet` installs them all again",
               file=sys.stderr)  # fmt: skip
         return BROKEN

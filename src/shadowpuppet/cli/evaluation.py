@@ -116,9 +116,19 @@ def _tables(measured: Mapping[str, Any]) -> Iterator[Any]:
 
 
 def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    from shadowpuppet.evaluation.summary_text import bones_text, clock_text, coverage_text, exchanges_text, losses_text, world_text
+    from shadowpuppet.evaluation.summary_text import (
+        bones_text,
+        clock_text,
+        coverage_text,
+        exchanges_text,
+        feet_text,
+        losses_text,
+        world_text,
+    )
 
     yield "no pose", losses_text(measured["losses"])
+    if feet := feet_text(measured["feet"]):
+        yield "feet", feet
     if "errors" not in measured:
         return
     yield "clock", clock_text(measured["clock"])

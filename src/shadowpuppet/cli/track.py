@@ -58,7 +58,8 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
     `shadowpuppet settings` lists more settings; each is a flag, such as --tracker.arm.particles 300.
     """
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.io.run import CompleteRun, read_run
+    from shadowpuppet.io.run import read_run
+    from shadowpuppet.io.run_writer import CompleteRun
     from shadowpuppet.pipeline.track import track_recording
     from shadowpuppet.pipeline.verdict.of_run import MOSTLY_LOST, lost_share
 
@@ -78,10 +79,24 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
         return _people_done(folder, metrics, quiet)
     if not quiet:
         _show_run(folder, metrics)
+        _show_project(recording, folder)
     if lost_share(motion) <= MOSTLY_LOST:
         return 0
     print(f"the person is lost: {'; '.join(metrics.get('verdict', {}).get('reasons', ()))}", file=sys.stderr)
     return PERSON_LOST
+
+
+def _show_project(recording: Path, folder: Path) -> None:
+    """The command that puts the run's joints where the program that made the project looks for them."""
+    import os
+
+    from shadowpuppet.io.projects import find_project
+
+    project = find_project(recording)
+    if project is not None:
+        formats, results = project.results
+        program = os.environ.get("SHADOWPUPPET_COMMAND", "shadowpuppet")
+        print(f"for {project.program}: {program} export {folder} --to {formats} -o {results}")
 
 
 def _people_done(folder: Path, metrics: Mapping[str, Any], quiet: bool) -> int:
@@ -107,13 +122,13 @@ def _after_a_film(camera: str) -> str:
     """Advice for a film, played as if live, in which no person was tracked; empty for cameras."""
     if not Path(camera).exists():
         return ""
-    return ("; a film that ends before the empty scene is learnt and the person measured needs --background with the empty scene, and a "
-            f"slower --speed; `track {camera}` follows the person in all of it")
+    return ("; the film ended before its scene was found and the person measured: give a shorter --learn, or --background with the empty "
+            f"scene; `track {camera}` follows the person in all of it")
 
 
 def _check_earlier(folder: Path, force: bool) -> None:
     """Ask at a terminal before an earlier run is replaced. Raises `ShadowPuppetError` if it is not to be."""
-    from shadowpuppet.io.run import earlier_run
+    from shadowpuppet.io.run_writer import earlier_run
 
     earlier = None if force else earlier_run(folder)
     if earlier is None:
@@ -128,11 +143,12 @@ def _check_earlier(folder: Path, force: bool) -> None:
     raise ShadowPuppetError(f"{said}, or another folder (-o)")
 
 
-def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,
+def live(camera: Annotated[str | None, Parameter(help="The camera, or a film to be played as if it were one, as --camera.")] = None, /, *,
+         folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,
          quiet: Quiet = False, flags: SessionFlags = None, settings: LiveFlags = None, outlets: OutletFlags = None) -> None:
     """Track a person in front of a camera as it happens, shown on a page for a browser; Ctrl-C ends it.
 
-    Step out of the picture while the empty scene is learnt, then stand still in it until you are found.
+    Step out of the picture for the first seconds, then into it; or stay and move: the empty scene is found behind you.
     Pictures are kept only with --record. Joints are sent to other programs only with --osc, --websocket or --lsl.
     """
     from time import strftime
@@ -142,7 +158,10 @@ def live(*, folder: Annotated[Path | None, output("Folder of the run. [default: 
     from shadowpuppet.live.run import run_live
     from shadowpuppet.live.stream.choice import open_outlets
 
-    options, chosen = options_from(flags, config), validate(LiveSettings, given(settings), "flags")
+    asked = given(settings)
+    if camera is not None and asked.setdefault("camera", camera) != camera:
+        raise SettingsError(f"camera: found {camera} and --camera {asked['camera']}, expected one of them")
+    options, chosen = options_from(flags, config), validate(LiveSettings, asked, "flags")
     folder = folder or Path(strftime("live-%Y%m%d-%H%M%S"))
     with terminal(quiet, folder) as listener:
         opened = open_outlets(validate(OutletSettings, given(outlets), "flags"))

@@ -27,11 +27,14 @@ from shadowpuppet.evaluation.error_metrics import (
 from shadowpuppet.evaluation.exchanges import exchanges
 from shadowpuppet.evaluation.interval_coverage import coverage
 from shadowpuppet.evaluation.joint_angles import compared_poses, dof_errors, turn_errors
+from shadowpuppet.evaluation.standing import standing_figures
 from shadowpuppet.io.calibration.calibration_files import read_calibration
+from shadowpuppet.io.contacts import read_contacts
 from shadowpuppet.io.files.plain import for_json, plain
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.motion_files import names_in, read_truth
-from shadowpuppet.io.run import FILES, Run, read_run, write_metrics
+from shadowpuppet.io.run import Run, read_run
+from shadowpuppet.io.run_writer import FILES, write_metrics
 from shadowpuppet.motion.metrics import GROUPS, JointErrors, evaluate, joint_errors
 from shadowpuppet.motion.motion import ROUNDING, JointTable
 from shadowpuppet.motion.synchronization import at_common_times, at_times, find_offset, step_of
@@ -90,7 +93,7 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
     lost = {"losses": pose_losses(run.motion)}
     if table is None:
         measured = evaluate(run.motion, joints=_joint_names(how.joints), camera=_single_camera(cameras), cameras=max(len(cameras), 1))
-        return Evaluation(run, info | measured | lost, cameras)
+        return Evaluation(run, info | measured | lost | {"feet": standing_figures(run.motion.table)}, cameras)
     read = _cut(_within(run, read_truth(table, run.motion.joint_names), how), how, table)
     reference, clock = _on_our_clock(run, read, how, table)
     try:
@@ -103,6 +106,9 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
     ours, theirs = at_common_times(run.motion.table, reference)
     errors = joint_errors(ours, theirs, list(measured["errors"]["joints"]))
     measured |= lost | {"clock": clock | {"frames_compared": len(theirs.times)}, "world": world} | _error_metrics(run, ours, theirs, errors)
+    flags = read_contacts(table)
+    flags = None if flags is None else flags._replace(times=flags.times + clock["offset_s"])
+    measured["feet"] = standing_figures(run.motion.table, reference, flags)
     if how.angles:
         poses = compared_poses(run.motion, theirs)
         measured |= {"angles_deg": turn_errors(*poses), "dofs_deg": dof_errors(*poses)}

@@ -68,7 +68,7 @@ def losses_text(losses: Mapping[str, Any]) -> str:
 def world_text(world: Mapping[str, Any]) -> str:
     """The rigid motion between run and truth."""
     return (f"as a whole the run is turned by {world['rotation_deg']:.1f} degrees and {np.linalg.norm(world['moved_mm']):.0f} mm off"
-            + ("; all errors are told after that" if world["moved"] else ""))
+            + ("; all errors are stated after that" if world["moved"] else ""))
 
 
 def clock_text(clock: Mapping[str, Any]) -> str:
@@ -99,3 +99,22 @@ def exchanges_text(found: Mapping[str, Mapping[str, float]] | None) -> str | Non
         return "never"
     return "; ".join(f"{name} in {_percent(pair['share'])} of the frames, for {pair['longest_s']:.2f} s at most" if pair["frames"]
                      else f"{name} never" for name, pair in found.items())
+
+
+def feet_text(feet: Mapping[str, Any]) -> str | None:
+    """How the feet stand, in words; None for a run without soles."""
+    if not feet:
+        return None
+    true = feet.get("true_stance")
+    shown = true or feet
+    beside = "" if true is None else f" (the truth's points {_plain(true['truth_slide_mm_s'])})"
+    contacts = ""
+    if true is not None and np.isfinite([true["precision"], true["recall"]]).all():
+        contacts = (f"; contacts found are right in {_percent(true['precision'])}, {_percent(true['recall'])} of the true ones are "
+                    "found")
+    below = f", {shown['depth_mm']['mean']:.1f} mm below the floor in the mean" if shown["depth_mm"] else ""
+    return f"in stance they slide by {_plain(shown['slide_mm_s'])} mm/s{beside}{below}{contacts}; floor at {feet['floor_m']:.3f} m"
+
+
+def _plain(value: float) -> str:
+    return f"{value:.0f}" if np.isfinite(value) else "unknown"

@@ -1,6 +1,6 @@
 """What a run needs to go on after it was killed: `checkpoint.npz`, the state after some frame, and `checkpoint.frames`, the frames exactly.
 
-Frames are flushed one by one, so that they reach at least as far as the checkpoint. The run's tables are written anew from them.
+Frames are flushed one by one, so that they reach at least as far as the checkpoint. The run's tables are written again from them.
 """
 
 from __future__ import annotations

@@ -25,7 +25,6 @@ from shadowpuppet.io.motion.joint_names import read_names
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.npz import write_motion_npz, write_npz
 from shadowpuppet.io.motion.opensim.coordinates import MODELS, coordinates
-from shadowpuppet.io.motion.opensim.feet import with_feet
 from shadowpuppet.io.motion.opensim.markers import marker_names
 from shadowpuppet.io.motion.opensim.model_writer import write_osim
 from shadowpuppet.io.motion.opensim.mot import write_mot
@@ -38,6 +37,7 @@ from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.body_animation import BodyTree, motion_animation
+from shadowpuppet.motion.contact.contact import FootEvent, contacts_of, foot_events
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.limbs import DOUBTFUL, limb_of
 from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
@@ -202,7 +202,7 @@ class _RunExport:
         animation, off = motion_animation(self.body, self.run.motion)
         if off > TOLERANCE:
             warn(f"{self.run.folder}: the joints of the body in person.toml lie up to {1000 * off:.0f} mm off the run's: the person was "
-                 "measured anew while it was made", ShadowPuppetWarning, stacklevel=3)  # fmt: skip
+                 "measured again while it was made", ShadowPuppetWarning, stacklevel=3)  # fmt: skip
         return animation
 
     @cached_property
@@ -211,10 +211,10 @@ class _RunExport:
         return Puppet(self.animation, body_mesh(self.body), self.body)
 
     @property
-    def markers(self) -> JointTable:
-        """The joints, with heels and toes if person.toml has a body with feet."""
-        table = self.run.motion.table
-        return with_feet(table, self.body, self.animation) if (self.run.folder / "person.toml").exists() else table
+    def events(self) -> list[FootEvent]:
+        """When the feet meet the floor and leave it; empty for a run without soles."""
+        contacts = contacts_of(self.run.motion.table)
+        return [] if contacts is None else foot_events(self.run.motion.times, contacts)
 
     @property
     def spread(self) -> Array:
@@ -289,9 +289,10 @@ def _write_model(path: Path, puppet: Puppet, layout: Layout) -> None:
 
 
 FORMATS = {
-    "c3d": Format(lambda export, path: write_c3d(path, export.run.motion.table, export.spread, export.angles, export.smoothing),
+    "c3d": Format(lambda export, path: write_c3d(path, export.run.motion.table, export.spread, export.angles, export.smoothing,
+                                                 export.events),
                   lambda path, table, layout: write_c3d(path, table)),
-    "trc": Format(lambda export, path: _write_markers(path, export.markers, export.layout), _write_markers),
+    "trc": Format(lambda export, path: _write_markers(path, export.run.motion.table, export.layout), _write_markers),
     "csv": Format(lambda export, path: write_columns(path, motion_columns(export.run.motion)),
                   lambda path, table, layout: write_joints(path, table)),
     "npz": Format(lambda export, path: write_motion_npz(path, export.run.motion), lambda path, table, layout: write_npz(path, table)),

@@ -15,8 +15,8 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import RecordingError, reason
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.io.recording import FILM_SUFFIXES, Recording, View, read_recording
-from shadowpuppet.video import IMAGE_SUFFIXES, camera_number, open_frames, write_frames
+from shadowpuppet.io.recording import Recording, View, read_recording
+from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES, camera_number, open_frames, write_frames
 from shadowpuppet.video.frames import ASSUMED_RATE
 
 MADE_BY = "made_by.toml"

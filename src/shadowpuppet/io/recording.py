@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import count, takewhile
@@ -11,20 +10,17 @@ from pathlib import Path
 from typing import Any
 from warnings import warn
 
-from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, expected_metres, is_within
+from shadowpuppet.body.sizes import DISTANCES, HEIGHTS
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices, reason
-from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, find_calibration, read_calibration
-from shadowpuppet.io.files.text import read_toml
-from shadowpuppet.video import IMAGE_SUFFIXES, camera_number, open_frames
+from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, read_calibration
+from shadowpuppet.io.calibration.formats import find_calibration
+from shadowpuppet.io.projects import Project, films_in, find_project, sources_in
+from shadowpuppet.io.recording_toml import RecordingNotes
+from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES, camera_number, open_frames
 
-FILM_SUFFIXES = (".264", ".3gp", ".avi", ".flv", ".gif", ".h264", ".hevc", ".m2ts", ".m4v", ".mjpeg", ".mkv", ".mov", ".mp4",
-                 ".mpeg", ".mpg", ".mts", ".mxf", ".ogv", ".ts", ".webm", ".wmv", ".y4m")
-"""Endings of films that are found in a folder; others can be named in recording.toml."""
 POSTURES = ("front_t_pose", "side_arms_hanging", "front_arms_t_pose")
 """Reference postures of Liu 2011's initialisation, for O1, O2 and O3 (IV-A)."""
-KEYS = ("subject", "rate", "duration", "calibration", "unit", "up", "truth", "training", "start", "video", "background", "masks")
-"""Keys of recording.toml."""
 RATES = (0.1, 10_000.0)
 """Limits of `rate`, frames/s."""
 BLOCK, MAX_PADDING = 16, 0.05
@@ -90,7 +86,8 @@ class Recording:
 
 
 def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None) -> Recording:
-    """Read a recording: a folder (video/ or films, calibration.toml, ...), or one film, folder of pictures or live camera.
+    """Read a recording: a folder (video/ or films, calibration.toml, ...), another program's project (`io.projects`), or one film, folder
+    of pictures or live camera.
 
     `calibration` replaces the folder's; `fov` (horizontal, radians) suffices for one camera. Raises `RecordingError`,
     `CalibrationError` or `VideoError`, naming file and field, if something is missing or does not fit.
@@ -100,10 +97,11 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
         exists = folder.exists()
     except OSError as error:  # for example, a name that is too long
         raise RecordingError(f"{folder}: cannot be read ({reason(error)})") from None
-    if camera_number(path) is None and not exists:
+    project = find_project(folder) if camera_number(path) is None else None
+    if camera_number(path) is None and not exists and project is None:
         raise RecordingError(f"{folder}: no such recording, expected a folder with video/ and calibration.toml, or a film")
-    if folder.is_dir() and (any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml")) or _loose(folder)):
-        return _read_folder(folder, fov, calibration)
+    if project is not None or (folder.is_dir() and (_is_own(folder) or films_in(folder))):
+        return _read_folder(project.folder if project else folder, fov, calibration, project)
     if folder.is_dir() and not any(p.suffix.lower() in IMAGE_SUFFIXES for p in folder.iterdir()):
         raise RecordingError(f"{folder}: found neither films nor video/ nor calibration.toml nor pictures in it, expected a "
                              "recording (<camera>.mp4 or video/<camera>.mp4, and calibration.toml) or a folder of pictures")
@@ -120,15 +118,33 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
     return Recording(folder, folder.stem, (view,))
 
 
-def _read_folder(folder: Path, fov: float | None, calibration: Path | None) -> Recording:
-    notes = _Notes(folder)
+def _is_own(folder: Path) -> bool:
+    """Whether a folder is laid out as a recording."""
+    return any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml"))
+
+
+def is_recording(folder: Path) -> bool:
+    """Whether a folder holds films with what is known about them, so that it is more than a calibration."""
+    return any((folder / name).exists() for name in ("video", "recording.toml")) or find_project(folder) is not None
+
+
+def _read_folder(folder: Path, fov: float | None, calibration: Path | None, project: Project | None) -> Recording:
+    """A recording folder; what it does not say is as the project of another program says."""
+    notes = RecordingNotes(folder)
     height = notes.number("height", HEIGHTS, "metres", "subject")
     distance = notes.number("distance", DISTANCES, "metres", "subject")
     films, backgrounds, masks = (_sources(folder, kind, notes) for kind in ("video", "background", "masks"))
+    if project is not None:
+        films = films or project.films
     if not films:
         raise RecordingError(f"{folder}: no films in it, expected <camera>.mp4 or video/<camera>.mp4, a folder of pictures "
                              "video/<camera>/, or a [video] table in recording.toml")
-    cameras = _cameras(folder, films, fov, calibration or notes.file("calibration") or find_calibration(folder), notes)
+    calibration = calibration or notes.file("calibration") or (project.calibration if project else find_calibration(folder))
+    if project is not None and calibration is None and fov is None:
+        raise RecordingError(f"{folder}: {project.no_calibration}")
+    cameras = _cameras(folder, films, fov, calibration, notes)
+    if project is not None:
+        cameras = _in_order(cameras, films, project)
     for kind, sources in (("video", films), ("background", backgrounds), ("masks", masks)):
         _check_names(folder / kind, sources, cameras)
     missing = [c.name for c in cameras if c.name not in films]
@@ -143,8 +159,30 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None) -> R
     rate = notes.number("rate", RATES, "frames/s")
     duration = notes.number("duration", DURATIONS, "seconds")
     references = _references(folder / "references")
-    return Recording(folder, folder.resolve().name, views, Subject(height, distance), references, truth, training, rate, duration,
-                     truths=_truths(folder))
+    recording = Recording(folder, folder.resolve().name, views, Subject(height, distance), references, truth, training, rate, duration,
+                          truths=_truths(folder))
+    return recording if project is None else _with_facts(recording, project)
+
+
+def _in_order(cameras: tuple[Camera, ...], films: dict[str, Any], project: Project) -> tuple[Camera, ...]:
+    """The cameras under the films' names: these programs pair the two by order where names differ."""
+    if set(films) <= {camera.name for camera in cameras} or len(films) != len(cameras):
+        return cameras
+    named = tuple(replace(camera, name=name) for camera, name in zip(cameras, films))
+    warn(f"{project.folder}: films and calibration have other names of cameras, and are paired by order, as {project.program} does: "
+         f"{', '.join(f'{film} is {camera.name}' for camera, film in zip(cameras, films))}", ShadowPuppetWarning, stacklevel=4)
+    return named
+
+
+def _with_facts(recording: Recording, project: Project) -> Recording:
+    """The recording with what the project says and recording.toml does not."""
+    rate, begin, duration = recording.rate or project.rate, 0.0, recording.duration
+    if project.frames is not None and duration is None:
+        first, last = project.frames
+        of_film = rate or open_frames(recording.views[0].video).rate
+        begin, duration = max(first - 0.5, 0) / of_film, (last + 0.5) / of_film
+    subject = replace(recording.subject, height=recording.subject.height or project.height)
+    return replace(recording, name=project.name, subject=subject, rate=rate, begin=begin, duration=duration)
 
 
 def _truths(folder: Path) -> tuple[Path, ...]:
@@ -153,57 +191,7 @@ def _truths(folder: Path) -> tuple[Path, ...]:
     return tuple(found)
 
 
-class _Notes:
-    """The content of recording.toml; empty if there is none."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.path = folder, folder / "recording.toml"
-        self.data = read_toml(self.path, RecordingError) if self.path.exists() else {}
-        self._check_keys(self.data, KEYS, "")
-        self._check_keys(self.table("subject"), ("height", "distance"), "subject.")
-
-    def _check_keys(self, table: dict[str, Any], known: Iterable[str], prefix: str) -> None:
-        unknown = set(table) - set(known)
-        if unknown:
-            raise RecordingError(f"{self.path}: found the key {prefix}{min(unknown)}; keys known there: {choices(known)}")
-
-    def table(self, key: str) -> dict[str, Any]:
-        value = self.data.get(key, {})
-        if not isinstance(value, dict):
-            raise RecordingError(f"{self.path}: {key}: found {value!r}, expected a table [{key}]")
-        return value
-
-    def number(self, key: str, limits: tuple[float, float], unit: str, table: str = "") -> float | None:
-        value = (self.table(table) if table else self.data).get(key)
-        if value is None:
-            return None
-        if not is_within(value, limits):
-            expected = expected_metres(value, limits) if unit == "metres" else f"expected {limits[0]:g} to {limits[1]:g} {unit}"
-            raise RecordingError(f"{self.path}: {'start.' if table == 'start' else ''}{key}: found {value!r}, {expected}")
-        return float(value)
-
-    def choice(self, key: str, known: Iterable[str]) -> str | None:
-        value = self.data.get(key)
-        if value is not None and value not in list(known):
-            raise RecordingError(f"{self.path}: {key}: found {value!r}, expected one of {', '.join(known)}")
-        return value
-
-    def file(self, key: str) -> Path | None:
-        return self._existing(key, self.data[key]) if key in self.data else None
-
-    def source(self, kind: str, camera: str) -> Path | int | str:
-        value = self.table(kind)[camera]
-        live = not isinstance(value, bool) and isinstance(value, (int, str)) and camera_number(value) is not None
-        return value if live and kind == "video" else self._existing(f"{kind}.{camera}", value)
-
-    def _existing(self, key: str, value: object) -> Path:
-        path = self.folder / value if isinstance(value, str) else None
-        if path is None or not os.path.exists(path):  # unlike that of `Path`, false for an impossible name
-            raise RecordingError(f"{self.path}: {key}: found {value!r}, expected the path of an existing file, from this folder")
-        return path
-
-
-def _starts(notes: _Notes, cameras: Iterable[Camera]) -> dict[str, float]:
+def _starts(notes: RecordingNotes, cameras: Iterable[Camera]) -> dict[str, float]:
     """`View.start` by camera, from recording.toml."""
     _check_names(notes.path, notes.table("start"), cameras)
     found = {name: notes.number(name, STARTS, "seconds", "start") for name in notes.table("start")}
@@ -214,27 +202,13 @@ def _first(folder: Path, stem: str, endings: list[str]) -> Path | None:
     return next((p for p in (folder / f"{stem}.{ending}" for ending in endings) if p.exists()), None)
 
 
-def _sources(folder: Path, kind: str, notes: _Notes) -> dict[str, Any]:
+def _sources(folder: Path, kind: str, notes: RecordingNotes) -> dict[str, Any]:
     """Film, picture or folder by camera: those named in recording.toml, else <kind>/<camera>.*."""
     sources: dict[str, Any] = {camera: notes.source(kind, camera) for camera in notes.table(kind)}
-    found = _films(folder / kind, FILM_SUFFIXES if kind == "video" else FILM_SUFFIXES + IMAGE_SUFFIXES)
+    found = sources_in(folder / kind, FILM_SUFFIXES if kind == "video" else FILM_SUFFIXES + IMAGE_SUFFIXES)
     if kind == "video" and not found and not sources:
-        found = _loose(folder)
+        found = films_in(folder)  # films lie in a recording's folder itself in many laboratories
     return {name: _only(paths) for name, paths in found.items() if name not in sources} | sources
-
-
-def _loose(folder: Path) -> dict[str, list[Path]]:
-    """Films that lie in a recording's folder itself, as in many laboratories, by camera."""
-    return {name: films for name, paths in _films(folder, FILM_SUFFIXES).items() if (films := [path for path in paths if path.is_file()])}
-
-
-def _films(folder: Path, suffixes: tuple[str, ...]) -> dict[str, list[Path]]:
-    """Films and folders in a folder, by name without ending, sorted."""
-    films: dict[str, list[Path]] = {}
-    for path in sorted(folder.iterdir()) if folder.is_dir() else []:
-        if path.name[0] != "." and (path.is_dir() or path.suffix.lower() in suffixes):
-            films.setdefault(path.name if path.is_dir() else path.stem, []).append(path)
-    return films
 
 
 def _only(paths: list[Path]) -> Path:
@@ -244,7 +218,7 @@ def _only(paths: list[Path]) -> Path:
 
 
 def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration: Path | None,
-             notes: _Notes | None = None) -> tuple[Camera, ...]:
+             notes: RecordingNotes | None = None) -> tuple[Camera, ...]:
     if calibration is not None and fov is not None:
         raise RecordingError(f"{folder}: found a field of view and a calibration ({calibration.name}), expected one of them")
     if calibration is not None:
@@ -316,7 +290,7 @@ def _remedy(found: tuple[int, int], expected: tuple[int, int]) -> str:
 
 
 def _references(folder: Path) -> tuple[Reference, ...]:
-    found = _films(folder, FILM_SUFFIXES + IMAGE_SUFFIXES)
+    found = sources_in(folder, FILM_SUFFIXES + IMAGE_SUFFIXES)
     unknown = sorted(name for name in found if name.removesuffix("_mask") not in POSTURES)
     if unknown:
         raise RecordingError(f"{folder}: found {choices(unknown)}; postures known: {', '.join(POSTURES)}, and <posture>_mask")

@@ -1,53 +1,40 @@
-"""Reads and writes run folders: a tracked motion, written frame by frame, with its settings and metrics.
+"""Reads run folders: a tracked motion, with its settings and metrics.
 
     joints.csv     time, <joint>_x, _y, _z (m, world), <joint>_sd_x, _sd_y, _sd_z (m), status, cost (px), overlap (0..1), <limb>_status
     angles.csv     time, every degree of freedom (rad or m), then <dof>_sd
     intervals.csv  time, joint, mode, weight, x, y, z, x_low, x_high, y_low, ... (m, world): 90 % bounds, and other places (`io.intervals`)
+    contacts.csv   time, height of the floor (m), <point>_contact and <point>_probability of heels and toes (`io.contacts`)
     motion.npz     the fields of `Motion`, arrays only
     raw.csv        joints.csv and angles.csv as they were tracked, if they were smoothed afterwards; then run.toml has [smoothing]
     run.toml       complete, frames, body, versions, and what the tracker adds: recording, method, seed, settings, sizes, ...
     metrics.json   complete, frames, status (number of frames of each), limb_status (likewise, by limb), timings, errors, ...
 
 The tables grow with every frame; the other files are written at the end, also after an error. `complete` in run.toml says whether all
-frames were tracked. A killed run is read from its tables, and can go on (`io.checkpoint`). One process at a time writes into a folder.
+frames were tracked. A killed run is read from its tables, and can go on (`io.checkpoint`). `io.run_writer` writes them.
 """
 
 from __future__ import annotations
 
-import contextlib
 import json
-import platform
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
-from typing import Any, BinaryIO, Self
+from typing import Any
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, reason, shown
-from shadowpuppet.io import checkpoint
-from shadowpuppet.io.files.lock import LOCK, locked
-from shadowpuppet.io.files.plain import for_json, for_toml, plain
-from shadowpuppet.io.files.table import Table, csv_line, read_table, shorten
-from shadowpuppet.io.files.text import errors_named, read_limited, read_toml, write_whole
-from shadowpuppet.io.intervals import IntervalWriter
-from shadowpuppet.io.motion.npz import read_motion_npz, write_motion_npz
-from shadowpuppet.io.motion.table import read_raw, read_run_tables, run_headers, run_rows, write_raw
-from shadowpuppet.io.people import PEOPLE, person_folders, remove_people
-from shadowpuppet.motion.motion import Mode, Motion, MotionBuilder, MotionFrame
+from shadowpuppet.errors import FormatError
+from shadowpuppet.io.files.table import Table, read_table
+from shadowpuppet.io.files.text import errors_named, read_limited, read_toml
+from shadowpuppet.io.motion.npz import read_motion_npz
+from shadowpuppet.io.motion.table import read_raw, read_run_tables
+from shadowpuppet.io.people import person_folders
+from shadowpuppet.motion.motion import Motion
 
 TABLES = ("joints.csv", "angles.csv", "intervals.csv")
 RAW = "raw.csv"
-MADE = (RAW, "motion.npz", "metrics.json", "overlay.mp4")
-"""Files written at the end of a run."""
-FILES = (checkpoint.STATE, *MADE, *TABLES, checkpoint.FRAMES, "look.json", "person.toml", "calibration.toml")
-"""Files of an earlier run that a new one in its folder replaces or removes. run.toml, which marks a run's folder, always stays."""
+CONTACTS = "contacts.csv"
 METRICS_LIMIT = 50_000_000
 """Greatest size of metrics.json, bytes."""
-OWN_KEYS = ("complete", "frames", "body", "versions")
-"""Keys of run.toml that the writer sets."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,231 +59,6 @@ class Run:
         return self.info.get("settings", {})
 
 
-class CompleteRun(ShadowPuppetError):
-    """A run that is to go on has all of its frames."""
-
-
-class RunWriter:
-    """Writes a run: `with RunWriter(...) as run: run.write(frame)`; `run.metrics` may be filled until the end.
-
-    The folder must be new, empty or that of an earlier run, which is replaced by `begin`, at the latest when the first frame is written.
-    Raises `ShadowPuppetError` for any other folder, for one in which another run is being written, and if it cannot be written; frames
-    written before stay readable.
-    """
-
-    def __init__(self, folder: str | Path, body_name: str, dof_names: Sequence[str], joint_names: Sequence[str],
-                 info: Mapping[str, Any], resume: bool | None = None) -> None:
-        """`info`: entries of run.toml; dataclasses, arrays and paths are converted, values of None are left out. `resume`: whether an
-        earlier run of the same `info` goes on from its checkpoint; None: no checkpoints are kept."""
-        taken = set(info) & set(OWN_KEYS)
-        if taken:
-            raise ShadowPuppetError(f"info: found {min(taken)!r}, which the run's writer fills in itself")
-        self.folder, self.metrics = Path(folder), dict[str, Any]()
-        self.info = for_toml(plain(info, "info")) | {"body": body_name, "versions": versions()}
-        self._motion = MotionBuilder(body_name, dof_names, joint_names)
-        self._intervals = IntervalWriter(joint_names)
-        self._modes = dict[float, Sequence[Mode]]()
-        """Other places of limbs, by time: a motion does not keep them."""
-        self._tables: Sequence[BinaryIO] = ()
-        self._resume, self._earlier, self._stack = resume, False, contextlib.ExitStack()
-        self._before: list[MotionFrame] | None = None
-        self._people = False
-
-    def __enter__(self) -> Self:
-        """Make the folder, and lock it. Raises `ShadowPuppetError` if it cannot be used."""
-        with contextlib.ExitStack() as stack:
-            with self._system_errors():
-                self.folder.mkdir(parents=True, exist_ok=True)
-                stack.enter_context(locked(self.folder, "run"))
-                self._earlier = _check_folder(self.folder)
-                probe = self.folder / "run.toml.part"  # fail now rather than after hours of tracking
-                probe.touch()
-                probe.unlink()
-            if not self._earlier:
-                self._write_info(complete=False)  # marks the folder as a run's before callers add files to it
-            elif self._resume:
-                self._check_same(read_toml(self.folder / "run.toml", FormatError))
-            self._stack = stack.pop_all()
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Write the remaining files, after an error as far as possible."""
-        with self._stack:
-            if self._people:
-                self._write_info(complete=kind is None)
-            elif kind is None:
-                self.begin()
-                self._finish(complete=True)
-            elif self._tables:
-                with contextlib.suppress(ShadowPuppetError):
-                    self._finish(complete=False)
-            else:
-                self._leave()
-        if not self._tables and not self._earlier and not self._people:
-            with contextlib.suppress(OSError):  # others put files into it
-                self.folder.rmdir()
-
-    def _leave(self) -> None:
-        """Remove the mark of a run without frames, unless callers put files into the folder."""
-        with contextlib.suppress(OSError):
-            if not self._earlier and {path.name for path in self.folder.iterdir()} <= {"run.toml", LOCK}:
-                (self.folder / "run.toml").unlink()
-
-    def hand_over(self) -> None:
-        """Make the folder that of several people: an earlier run is removed, and only run.toml is written in it, with `people`; their
-        runs go into folders of their own (`io.people`)."""
-        if self._earlier:
-            _unmark(self.folder)
-            remove_people(self.folder, (*FILES, "run.toml"))
-        with self._system_errors():
-            for name in FILES:
-                (self.folder / name).unlink(missing_ok=True)
-        self._people = True
-        self.info["people"] = 0
-        self._write_info(complete=False)
-
-    def resumed(self, types: Iterable[type]) -> tuple[Any, list[MotionFrame]] | None:
-        """The state that the last `checkpoint` of the earlier run got, and its frames until then, from which `begin` goes on; None if the
-        run begins at the start. `types`: the named tuples in the state. Raises `FormatError` for a damaged checkpoint."""
-        found = checkpoint.read_checkpoint(self.folder, types) if self._resume and self._earlier else None
-        if found is None:
-            return None
-        frames = checkpoint.read_frames(self.folder, found.frames, len(self._motion.dof_names), len(self._motion.joint_names),
-                                        len(self._motion.limbs))
-        for frame in frames:
-            self._motion.append(frame)
-        self._before = frames
-        return found.state, frames
-
-    def checkpoint(self, state: Any) -> None:
-        """Keep a state from which the run can go on after the frames so far. Raises `ShadowPuppetError` if it cannot be written."""
-        checkpoint.write_checkpoint(self.folder, checkpoint.Checkpoint(len(self._motion), state))
-
-    def write(self, frame: MotionFrame) -> None:
-        """Add a frame. Raises `ShadowPuppetError` if it does not fit the run, or cannot be written."""
-        self.begin()
-        kept = self._motion.append(frame)
-        self._keep_modes(kept)
-        with self._system_errors():
-            _append(self._tables, run_rows(kept), self._intervals.lines(kept), checkpoint.frame_bytes(kept))
-            for table in self._tables:
-                table.flush()  # so that a killed run keeps it
-
-    def _keep_modes(self, frame: MotionFrame) -> None:
-        """Keep a frame's other places of limbs, if it has any."""
-        if frame.modes:
-            self._modes[frame.time] = frame.modes
-
-    @property
-    def motion(self) -> Motion:
-        """The frames so far."""
-        return self._motion.build()
-
-    def revise(self, revised: Motion) -> None:
-        """Replace the frames so far, at the end of a run; the tables as they were go to raw.csv. Raises `ShadowPuppetError` if something
-        cannot be written; the tables stay as they were."""
-        self.begin()
-        builder = MotionBuilder(revised.body_name, revised.dof_names, revised.joint_names)
-        parts = [f"{name}.part" for name in (RAW, *TABLES)]
-        try:
-            with self._system_errors():
-                write_raw(self.folder / parts[0], *(self.folder / name for name in TABLES[:2]))
-                with ExitStack() as stack:
-                    tables = [stack.enter_context((self.folder / part).open("wb")) for part in parts[1:]]
-                    _append(tables, run_headers(builder.joint_names, builder.dof_names), self._intervals.header())
-                    for frame in revised.frames():
-                        kept = builder.append(frame._replace(modes=self._modes.get(frame.time, ())))
-                        _append(tables, run_rows(kept), self._intervals.lines(kept))
-                for table in self._tables:
-                    table.close()
-                for part in parts:
-                    (self.folder / part).replace(self.folder / part.removesuffix(".part"))
-                self._motion = builder
-                self._tables = [(self.folder / name).open("ab") for name in TABLES]
-        finally:
-            for part in parts:
-                with contextlib.suppress(OSError):
-                    (self.folder / part).unlink(missing_ok=True)
-
-    def begin(self) -> None:
-        """Replace an earlier run and write the headers, or write the one that is `resumed` up to its checkpoint, once.
-
-        The folder never holds files of two runs: the earlier one loses its mark of being complete first, and run.toml becomes the new
-        one's when nothing of the earlier one is left.
-        """
-        if self._tables:
-            return
-        if self._earlier and self._before is None:
-            _unmark(self.folder)
-        with self._system_errors():
-            for name in () if not self._earlier else FILES if self._before is None else MADE:
-                (self.folder / name).unlink(missing_ok=True)
-            if self._earlier:
-                remove_people(self.folder, (*FILES, "run.toml"))
-        if self._before is None:
-            self._write_info(complete=False)
-        with self._system_errors():
-            tables = [(self.folder / name).open("wb") for name in TABLES]
-            self._tables = tables if self._resume is None else [*tables, checkpoint.open_frames(self.folder, self._before or [])]
-            _append(self._tables, run_headers(self._motion.joint_names, self._motion.dof_names), self._intervals.header())
-            for kept in self._before or []:
-                self._keep_modes(kept)
-                _append(self._tables, run_rows(kept), self._intervals.lines(kept))
-            for table in self._tables:
-                table.flush()
-
-    def _finish(self, complete: bool) -> None:
-        for table in self._tables:
-            with contextlib.suppress(OSError):
-                table.close()
-        motion = self._motion.build()
-        # The most important file first, in case the disk is full.
-        write_motion_npz(self.folder / "motion.npz", motion)
-        counts = {"complete": complete, "frames": len(motion), "status": motion.status_counts,
-                  "limb_status": motion.limb_status_counts}
-        write_metrics(self.folder, counts | self.metrics)
-        self._write_info(complete)
-        if complete:
-            for name in (checkpoint.STATE, checkpoint.FRAMES):
-                with contextlib.suppress(OSError):
-                    (self.folder / name).unlink(missing_ok=True)
-
-    def _write_info(self, complete: bool) -> None:
-        import tomli_w
-
-        head = {"complete": complete, "frames": len(self._motion)}
-        write_whole(self.folder / "run.toml", tomli_w.dumps(head | self.info))
-
-    def _check_same(self, earlier: Mapping[str, Any]) -> None:
-        """Raise `CompleteRun` if an earlier run is complete, `ShadowPuppetError` if its run.toml differs from this one's."""
-        import tomllib
-
-        import tomli_w
-
-        ours = tomllib.loads(tomli_w.dumps(self.info))
-        for key in sorted((earlier.keys() | ours.keys()) - {"complete", "frames", "smoothing"}):
-            if difference := _difference(key, earlier.get(key), ours.get(key)):
-                raise ShadowPuppetError(f"{self.folder}: the run there cannot go on as another one: {difference}")
-        if earlier["complete"]:
-            raise CompleteRun(f"{self.folder}: the run is complete: nothing is left to be done")
-
-    @contextlib.contextmanager
-    def _system_errors(self) -> Iterator[None]:
-        """Convert `OSError` to `ShadowPuppetError`, which states what was saved."""
-        try:
-            yield
-        except OSError as error:
-            frames = len(self._motion)
-            kept = f"; the {frames} frames so far are in joints.csv and angles.csv" if frames else ""
-            raise ShadowPuppetError(f"{self.folder}: the run cannot be written ({reason(error)}){kept}") from None
-
-
-def _append(tables: Sequence[BinaryIO], rows: tuple[list[str], list[str]], intervals: str, exact: bytes = b"") -> None:
-    """Append a row to joints.csv and angles.csv, lines to intervals.csv, and the frame to `checkpoint.FRAMES` if that is among them."""
-    for table, content in zip(tables, (*(text.encode() for text in (*map(csv_line, rows), intervals)), exact)):
-        table.write(content)
-
-
 def read_run(folder: str | Path) -> Run:
     """Read a run folder, also a killed run's. Raises `FormatError`, naming file, line and column, if something is malformed."""
     folder = Path(folder)
@@ -316,58 +78,6 @@ def read_run(folder: str | Path) -> Run:
     else:
         motion = _read_tables(folder, info["body"], cut=not info["complete"])
     return Run(folder, motion, info, _read_metrics(folder / "metrics.json"))
-
-
-def write_metrics(folder: str | Path, metrics: Mapping[str, Any]) -> None:
-    """Write metrics.json; NaN becomes null. Raises `ShadowPuppetError` if that fails."""
-    text = json.dumps(for_json(plain(metrics, "metrics")), indent=1, ensure_ascii=False, allow_nan=False)
-    write_whole(Path(folder) / "metrics.json", text + "\n")
-
-
-def versions() -> dict[str, str]:
-    """Versions of Python and the libraries on which results depend."""
-    found = {"python": platform.python_version()}
-    for name in ("shadowpuppet", "numpy", "scipy", "numba", "opencv-python-headless", "av"):
-        with contextlib.suppress(metadata.PackageNotFoundError):
-            found[name] = metadata.version(name)
-    return found
-
-
-def _check_folder(folder: Path) -> bool:
-    """Whether a folder holds an earlier run. Raises `ShadowPuppetError` if it holds other files."""
-    names = sorted(path.name for path in folder.iterdir() if path.name != LOCK)
-    if not names:
-        return False
-    info = folder / "run.toml"
-    if not info.exists() or not {"complete", "versions"} <= set(read_toml(info, FormatError)):
-        raise ShadowPuppetError(f"{folder}: found {shorten(names, 60)} in it but no run.toml of a run, expected a new or empty "
-                                "folder, or that of an earlier run, which is replaced")
-    return True
-
-
-def _difference(where: str, before: Any, now: Any) -> str:
-    """The first difference of two plain values in words; empty if they are equal."""
-    if isinstance(before, dict) and isinstance(now, dict):
-        return next(filter(None, (_difference(f"{where}.{key}", before.get(key), now.get(key)) for key in sorted(before | now))), "")
-    return "" if before == now else f"{where} was {shown(before)}, and is {shown(now)}"
-
-
-def earlier_run(folder: str | Path) -> dict[str, Any] | None:
-    """The contents of run.toml of the run in a folder, None if there is no run with frames. Raises `FormatError` if it is malformed."""
-    folder = Path(folder)
-    if not (folder / "run.toml").exists() or not any((folder / name).exists() for name in (TABLES[0], PEOPLE)):
-        return None
-    info = read_toml(folder / "run.toml", FormatError)
-    return info if {"complete", "versions"} <= set(info) else None
-
-
-def _unmark(folder: Path) -> None:
-    """Note in a run's run.toml that it is not complete."""
-    import tomli_w
-
-    info = read_toml(folder / "run.toml", FormatError)
-    if info["complete"]:
-        write_whole(folder / "run.toml", tomli_w.dumps(info | {"complete": False}))
 
 
 def _read_tables(folder: Path, body_name: str, cut: bool) -> Motion:

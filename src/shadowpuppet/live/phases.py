@@ -1,4 +1,4 @@
-"""Helpers for the phases before tracking: collect the empty scene, detect a person standing still, fit the sizes in a thread."""
+"""Helpers for the phases before tracking: collect pictures of the scene, wait for a person, work in a thread."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import evenly_spread
-from shadowpuppet.silhouette.background import FrameSampler, smoothed, to_planes
 from shadowpuppet.silhouette.quality import MIN_CONTACT, NEARLY_ALL
 from shadowpuppet.video import Image
 
@@ -22,39 +21,50 @@ STILL = 0.1
 APART = 0.25
 """Age of that earlier silhouette, seconds."""
 MEASURED = 6
-"""Number of silhouettes from which a person is measured."""
+"""Number of silhouettes of a person who stands still from which they are measured."""
+MOVING = 3.0
+"""Seconds in the picture after which a person is measured, whatever they do."""
 
 
 class StandStillDetector:
-    """Detects from silhouettes when a person has stood still for long enough to be measured."""
+    """Detects from silhouettes when a person can be measured: having stood still for long enough, or been in the picture for `MOVING`."""
 
     def __init__(self, seconds: float) -> None:
         """`seconds`: how long a person must stand still."""
         self.seconds, self.message = seconds, "step into the picture, facing the camera"
         self._seen: deque[tuple[float, Mask]] = deque()
-        self._since = np.nan
+        self._since, self._there = np.nan, np.nan
 
     def see(self, now: float, mask: Mask) -> list[Mask] | None:
-        """Take a silhouette (H, W) at time `now` (s). Returns up to `MEASURED` silhouettes once a person has stood still, else None."""
-        while len(self._seen) > 1 and self._seen[0][0] < now - max(self.seconds, APART) - 0.5:
+        """Take a silhouette (H, W) at time `now` (s). Returns up to `MEASURED` silhouettes of a person who stood still, twice as many of
+        one who moved; None before."""
+        while len(self._seen) > 1 and self._seen[0][0] < now - max(self.seconds, APART, MOVING) - 0.5:
             self._seen.popleft()
         hint = unfit(mask)
         moves = not hint and self._moves(now, mask)
         self._seen.append((now, mask))
-        if hint or moves:
-            self._since, self.message = np.nan, hint or "stand still a moment, facing the camera"
+        self.message = hint or "stand still a moment, facing the camera"
+        if hint:
+            self._since = self._there = np.nan
             return None
-        self._since = now if np.isnan(self._since) else self._since
-        self.message = "stand still a moment, facing the camera"
-        if now - self._since < self.seconds:
-            return None
-        still = [seen for time, seen in self._seen if time >= self._since]
-        return [still[k] for k in evenly_spread(len(still), MEASURED)]
+        self._there = now if np.isnan(self._there) else self._there
+        if moves:
+            self._since = np.nan
+        elif np.isnan(self._since):
+            self._since = now
+        if now - self._since >= self.seconds:
+            return self._from(self._since, MEASURED)
+        return self._from(self._there, 2 * MEASURED) if now - self._there >= MOVING else None
+
+    def _from(self, since: float, most: int) -> list[Mask]:
+        """At most `most` silhouettes from the time `since` (s) on."""
+        seen = [mask for time, mask in self._seen if time >= since]
+        return [seen[k] for k in evenly_spread(len(seen), most)]
 
     def wait(self) -> None:
         """Start again, after a gap in the pictures."""
         self._seen.clear()
-        self._since = np.nan
+        self._since = self._there = np.nan
 
     def _moves(self, now: float, mask: Mask) -> bool:
         """Whether the silhouette differs from the one `APART` seconds earlier, or from the last one if there is none that old."""
@@ -66,7 +76,7 @@ def unfit(mask: Mask) -> str:
     """Advice for a person who cannot be measured in a silhouette (H, W); empty if they can."""
     share = float(mask.mean())
     if share >= NEARLY_ALL:
-        return "nearly all of the picture has changed: let the background be learnt anew"
+        return "nearly all of the picture has changed: let the background be learnt again"
     if share < NOBODY:
         return "step into the picture, facing the camera"
     if share > TOO_NEAR or int(mask[0].sum()) >= MIN_CONTACT:
@@ -103,40 +113,45 @@ def in_background(task: Callable[[], Result]) -> Callable[[], Result | None]:
 
 
 KEPT = 20
-"""Least number of pictures of the empty scene that are kept; at most twice as many are."""
-MOVED, MOVED_SHARE = 20.0, 0.005
-"""The scene moved if more than this share of pixels differ by more than this many grey levels between the first and the last pictures."""
-TRIES = 3
-"""Number of attempts; the last one is used even if the scene moved."""
+"""Least number of pictures that are kept of a session; at most twice as many are."""
+
+
+class PictureSampler:
+    """Keeps `KEPT` to twice `KEPT` of the pictures added, evenly spread, with their times; all of them if there are fewer."""
+
+    def __init__(self) -> None:
+        """A sampler without pictures."""
+        self.kept: list[tuple[float, Image]] = []
+        self._step, self._seen = 1, 0
+
+    def add(self, time: float, image: Image) -> None:
+        """Add the next picture (H, W, 3) or (H, W), of a time (s)."""
+        if self._seen % self._step == 0:
+            self.kept.append((time, image))
+            if len(self.kept) == 2 * KEPT:
+                self.kept, self._step = self.kept[::2], 2 * self._step
+        self._seen += 1
 
 
 class BackgroundCollector:
-    """Counts down from the first picture on, then collects pictures of the empty scene."""
+    """Counts down from the first picture on, then collects pictures of the scene, empty or not."""
 
     def __init__(self, countdown: float, seconds: float) -> None:
         """`countdown`: seconds until collecting begins; `seconds`: how long it lasts."""
         self.countdown, self.seconds = countdown, seconds
-        self.tries, self.note = 0, ""
-        self._spread, self._began, self._left = FrameSampler(KEPT), np.nan, countdown + seconds
+        self.wait()
 
-    def see(self, now: float, image: Image) -> list[Image] | None:
-        """Take a picture (H, W, 3) or (H, W) at time `now` (s). Returns the pictures of the empty scene once it is complete, else None."""
+    def see(self, now: float, image: Image) -> bool:
+        """Take a picture (H, W, 3) or (H, W) at time `now` (s). Returns whether there are enough."""
         self._began = now if np.isnan(self._began) else self._began
         self._left = self._began + self.countdown + self.seconds - now
         if self._left <= self.seconds:
-            self._spread.add(image)
-        if self._left > 0 or len(self._spread.kept) < 2:
-            return None
-        scene = self._spread.kept
-        self.tries += 1
-        if self.tries < TRIES and moved(scene):
-            self.note, self._spread, self._began = "something moved: ", FrameSampler(KEPT), np.nan
-            return None
-        return scene
+            self.pictures.add(now, image)
+        return self._left <= 0 and len(self.pictures.kept) > 1
 
     def wait(self) -> None:
         """Start again with the next picture, after a gap in the pictures."""
-        self._spread, self._began, self._left = FrameSampler(KEPT), np.nan, self.countdown + self.seconds
+        self.pictures, self._began, self._left = PictureSampler(), np.nan, self.countdown + self.seconds
 
     @property
     def left(self) -> float:
@@ -145,13 +160,7 @@ class BackgroundCollector:
 
     @property
     def message(self) -> str:
-        """Instruction to the person."""
-        return f"{self.note}step out of the picture" if self._left > self.seconds else "stay out: the empty scene is learnt"
-
-
-def moved(scene: list[Image]) -> bool:
-    """Whether the last third of the pictures differs from the first third."""
-    third = max(len(scene) // 3, 1)
-    before, after = (np.mean([smoothed(to_planes(image)).astype(np.float32) for image in part], axis=0)
-                     for part in (scene[:third], scene[-third:]))
-    return float((np.abs(after - before).max(2) > MOVED).mean()) > MOVED_SHARE
+        """Instruction to the person; without a countdown there is none to be given."""
+        if self._left > self.seconds:
+            return "step out of the picture, or stay and move"
+        return "finding the empty scene" if self.countdown == 0 else "stay out, or keep moving: finding the empty scene"

@@ -45,12 +45,14 @@ class Recorder:
             film.write(image, time - self._first)
 
     def _begin(self, scenes: Sequence[list[Image]], height: float | None) -> list[FrameWriter]:
-        for name in ("video", "background"):
+        for name in ("video", "background") if any(scenes) else ("video",):
             (self.folder / name).mkdir(parents=True, exist_ok=True)
         write_calibration(self.folder / "calibration.toml", self.cameras)
         if height is not None:
             write_whole(self.folder / "recording.toml", f"[subject]\nheight = {height:.3f}     # metres, shoes on\n")
         for camera, scene in zip(self.cameras, scenes):
+            if not scene:
+                continue
             with write_frames(self.folder / "background" / f"{camera.name}.mp4", self.rate) as film:
                 for image in scene:
                     film.write(image)

@@ -85,6 +85,11 @@ class RigCapture:
         for capture in self.captures:
             capture.again()
 
+    def hold(self, still: bool) -> None:
+        """Let films stand `still`, or go on."""
+        for capture in self.captures:
+            capture.hold(still)
+
     @property
     def problem(self) -> str:
         """Why no pictures come, in a sentence; empty while they do."""

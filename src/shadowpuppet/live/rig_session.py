@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -15,22 +15,35 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.live.base_session import LiveSession, Outcome, scaled
+from shadowpuppet.live.first_look import EmptyScene, Task, scene_of
 from shadowpuppet.live.phases import NOBODY, BackgroundCollector
 from shadowpuppet.live.rig_capture import SnapshotSet
+from shadowpuppet.live.session import COUNTDOWN, FIRST_REFINED, LAST_REFINED
 from shadowpuppet.live.watchdog import CameraWatchdog
-from shadowpuppet.motion.motion import MotionFrame
+from shadowpuppet.motion.motion import BLANK, MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, worked_size
 from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, check_body, fit_in_views
 from shadowpuppet.pipeline.rig import FrameSet, Segment
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body
-from shadowpuppet.pipeline.survey import OPENED, OPENING
-from shadowpuppet.silhouette import learn_background
+from shadowpuppet.pipeline.survey.rig import OPENED, OPENING
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.video import Image
 
 STEP_IN = "step in between the cameras and move a little"
+Scene = tuple[EmptyScene, Silhouettes]
+"""A camera's empty scene, and the silhouettes before it."""
+
+
+def _found_scenes(films: Sequence[list[Image]], task: Task) -> list[Scene]:
+    """The scenes of each camera's pictures."""
+    return _before([scene_of(film) or EmptyScene(film) for film in films], task, films)
+
+
+def _before(scenes: Iterable[EmptyScene], task: Task, films: Sequence[list[Image]]) -> list[Scene]:
+    """Scenes, and silhouettes before them; pictures of a scene that was recovered show the person, too."""
+    return [(scene, scene.silhouettes(task, film if scene.recovered else [])[0]) for scene, film in zip(scenes, films)]
 
 
 @dataclass(eq=False, kw_only=True)
@@ -41,7 +54,7 @@ class RigSession(LiveSession):
     """The cameras for pictures of full size."""
     watchdogs: tuple[CameraWatchdog, ...]
     scene: list[list[Image]] = field(default_factory=list)
-    """Pictures of each camera's empty scene, of the working size; learnt if there are none."""
+    """Pictures of each camera's empty scene, of the working size; found if there are none."""
     height: float | None = None
     """Height of the person, metres; None if unknown."""
 
@@ -53,11 +66,13 @@ class RigSession(LiveSession):
         body = average_body(self.options.multiview.body)
         self._pictures = [Picture(body, camera, camera.T_camera_world) for camera in self._worked]
         self._segment: list[Segment] = []
+        self._found_again: Callable[[], list[Scene] | None] | None = None
+        self._due, self._between = np.inf, FIRST_REFINED
         given = self.scene if self.scene and all(self.scene) else None
         self.begin_learning()
         self.begin_waiting()
         if given is not None:
-            self._learnt(given)
+            self._learnt(_before(map(EmptyScene, given), self._task, [[]] * len(given)))
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
@@ -71,7 +86,7 @@ class RigSession(LiveSession):
 
     @property
     def scenes(self) -> list[list[Image]]:
-        """Pictures of each camera's empty scene."""
+        """Pictures of each camera's empty scene; none of one that was never seen empty."""
         return self.scene
 
     def check(self, shot: SnapshotSet) -> str:
@@ -94,8 +109,9 @@ class RigSession(LiveSession):
 
     def begin_learning(self) -> None:
         """Discard the collected pictures of the empty scenes."""
-        self._collectors = [BackgroundCollector(self.settings.countdown, self.settings.learn) for _ in self.full]
-        self._collected: list[list[Image] | None] = [None] * len(self.full)
+        usual = COUNTDOWN if self.watchdogs[0].live else 0.0
+        countdown = usual if self.settings.countdown is None else self.settings.countdown
+        self._collectors = [BackgroundCollector(countdown, self.settings.learn) for _ in self.full]
 
     def begin_waiting(self) -> None:
         """Start waiting until two cameras see a person."""
@@ -103,20 +119,56 @@ class RigSession(LiveSession):
         self._hint = STEP_IN
 
     def _learn(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
-        for n, (collector, image) in enumerate(zip(self._collectors, images)):
-            if self._collected[n] is None:
-                self._collected[n] = collector.see(shot.captured, image)
-        scenes = [scene for scene in self._collected if scene is not None]
-        if len(scenes) == len(self.full):
-            self._learnt(scenes)
+        ready = [collector.see(shot.captured, image) for collector, image in zip(self._collectors, images)]
+        if all(ready):
+            films = [[image for _, image in collector.pictures.kept] for collector in self._collectors]
+            self.phase, self._measured = "measuring", self.work(partial(_found_scenes, films, self._task))
         return Outcome(self._view(images))
 
-    def _learnt(self, scenes: list[list[Image]]) -> None:
-        self.scene = scenes
-        self._segment = [Silhouettes("live", learn_background(scene, self.options.silhouette)).following() for scene in scenes]
+    def _learnt(self, found: Sequence[Scene]) -> None:
+        self._seen_before(found)
+        self._due, self._between, self._found_again = self.clock() + FIRST_REFINED, FIRST_REFINED, None
         self.phase, self._state, self._before = ("tracking" if self.subject else "waiting"), None, None
 
+    def _seen_before(self, found: Sequence[Scene]) -> None:
+        """Use new silhouettes before the scenes."""
+        self.scene = [[] if scene.recovered else scene.pictures for scene, _ in found]
+        self._segment = [silhouettes.following() for _, silhouettes in found]
+
+    def _look_again(self, now: float, images: tuple[Image, ...], fits: bool) -> bool:
+        """From time to time find the scenes that were not seen empty again in all pictures so far. Whether they were, while the body does
+        not fit: a person who left the place where they stood at first leaves a hole in the scene."""
+        for collector, image in zip(self._collectors, images):
+            collector.pictures.add(now, image)
+        if self._found_again is None and now >= self._due and not all(self.scene):
+            self._between *= 2
+            self._due = now + self._between if self._between < LAST_REFINED else np.inf
+            films = [[image for _, image in collector.pictures.kept] for collector in self._collectors]
+            self._found_again = self.work(partial(_found_scenes, films, self._task))
+        found = None if self._found_again is None else self._found_again()
+        if found is None:
+            return False
+        self._found_again = None
+        if not fits:
+            self._seen_before(found)
+        return not fits
+
+    def _track(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
+        outcome = super()._track(shot, images)
+        status = outcome.frame.status if outcome.frame is not None else "lost"
+        if self._look_again(shot.captured, images, status == "tracked") and status in BLANK:
+            self.begin_waiting()
+            self.phase = "waiting"
+        return outcome
+
+    @property
+    def _task(self) -> Task:
+        """What is wanted of the pictures at first: silhouettes."""
+        return Task(self.options.silhouette, None, None)
+
     def _wait(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
+        if self._look_again(shot.captured, images, False):
+            self.begin_waiting()
         masks = self._masks(shot, images)
         if sum(may_be_person(mask) and float(mask.mean()) > NOBODY / 3 for mask in masks) > 1:
             self._first.append((shot.captured, masks))
@@ -142,10 +194,12 @@ class RigSession(LiveSession):
 
     def _measure(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
         """Check whether the fit is ready."""
-        found: MultiviewSubject | TrackingError | None = self._measured()
+        found: MultiviewSubject | TrackingError | list[Scene] | None = self._measured()
         if found is None:
-            return Outcome(self._view(images, self._masks(shot, images)))
-        if isinstance(found, TrackingError):
+            return Outcome(self._view(images, self._masks(shot, images) if self._segment else ()))
+        if isinstance(found, list):
+            self._learnt(found)
+        elif isinstance(found, TrackingError):
             self.begin_waiting()
             self.phase, self._hint = "waiting", f"no person's shape: {STEP_IN}"
         else:
@@ -187,5 +241,5 @@ class RigSession(LiveSession):
             slowest = max(self._collectors, key=lambda collector: collector.left)
             return slowest.message, slowest.left
         if self.phase == "tracking":
-            return "the body does not fit any more: measure anew" if self._gone else self._aside(), None
+            return "the body does not fit any more: measure again" if self._gone else self._aside(), None
         return self._hint if self.phase == "waiting" else "measuring: one moment", None

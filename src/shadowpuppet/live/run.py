@@ -14,7 +14,8 @@ import numpy as np
 
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.person import write_person
-from shadowpuppet.io.run import RunWriter, read_run, write_metrics
+from shadowpuppet.io.run import read_run
+from shadowpuppet.io.run_writer import RunWriter, write_metrics
 from shadowpuppet.live.base_session import Given, LiveSession, Outcome
 from shadowpuppet.live.display.view import Display
 from shadowpuppet.live.interrupt import Stop
@@ -160,9 +161,15 @@ class _Live:
             self.listener.note(f"given to other programs: {self.outlets.where}")
 
     def _follow(self) -> None:
-        while not (self.stop.wished or (self.capture.ended and not self.capture.newest.waiting)):
+        """Process pictures as they come. A film stands still on its last picture while the person is measured."""
+        last = None
+        while not (self.stop.wished or self._is_over):
             shot = self.capture.newest.take(IDLE)
+            if shot is None and not self.is_live and self.session.phase == "measuring":
+                shot = last
+            last = shot
             outcome = self.session.step(shot) if shot is not None else self.session.idle(self.capture.problem)
+            self.capture.hold(self.session.phase == "measuring")
             self._keep(outcome)
             self._tell(outcome)
             self.display.show(outcome.view)
@@ -172,6 +179,11 @@ class _Live:
         self._give(self.session.rest())
         if self.capture.error is not None:
             raise self.capture.error
+
+    @property
+    def _is_over(self) -> bool:
+        """Whether a film has ended, and nothing waits for its last picture."""
+        return self.capture.ended and not self.capture.newest.waiting and (self.is_live or self.session.phase != "measuring")
 
     def _give(self, given: tuple[Given, ...]) -> None:
         for frame, age in given:

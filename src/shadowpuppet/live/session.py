@@ -1,4 +1,4 @@
-"""A live session with one camera: learns the empty scene, waits for a person who stands still, measures and tracks them."""
+"""A live session with one camera: finds the empty scene, measures the person, tracks them, and refines both as it goes."""
 
 from __future__ import annotations
 
@@ -14,18 +14,25 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.person import Person
 from shadowpuppet.live.base_session import LiveSession, Outcome, scaled
+from shadowpuppet.live.first_look import EmptyScene, Found, Task, look, look_at
 from shadowpuppet.live.phases import BackgroundCollector, StandStillDetector, unfit
 from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, region_of, worked_size
 from shadowpuppet.pipeline.person import MonocularSubject
 from shadowpuppet.pipeline.rig import Segment
-from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_settings
-from shadowpuppet.silhouette import SilhouetteSettings, learn_background
+from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.tracking.monocular.initialization import SizeFit, find_person
-from shadowpuppet.tracking.status import LOST_OVERLAP
+from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.video import Image
 from shadowpuppet.video.live_source import Snapshot
+
+COUNTDOWN = 5.0
+"""Seconds to step out of a camera's picture."""
+FIRST_REFINED, LAST_REFINED = 3.0, 60.0
+"""Seconds of tracking after which scene and person are found again in all pictures so far; doubled each time, up to the last."""
+GAIN = 0.01
+"""Overlap that a person found again must gain."""
 
 
 @dataclass(eq=False, kw_only=True)
@@ -38,7 +45,7 @@ class Session(LiveSession):
     person: Person | None = None
     """The person's known sizes; None to measure them."""
     scene: list[Image] = field(default_factory=list)
-    """Pictures of the empty scene, of the working size; learnt if there are none."""
+    """Pictures of the empty scene, of the working size; found if there are none."""
     fit: SizeFit | None = None
     """Fitted sizes and place; None before."""
 
@@ -48,13 +55,18 @@ class Session(LiveSession):
         self.camera = self.full.resized(worked_size(self.full.size, self.options.max_size))
         self._region = region_of(self.options.region, self.full, self.camera)
         self._recent: list[Image] = []
-        self._silhouettes: Silhouettes | None = None
         self._clean: Silhouettes | None = None
         self._segment: Segment | None = None
+        self._scene: EmptyScene | None = None
+        self._refined: Callable[[], Found | None] | None = None
+        """Gives the result of a new look at the pictures so far; None while there is none."""
+        self._due, self._between, self._since = np.inf, FIRST_REFINED, -np.inf
         self.begin_learning()
-        self.begin_waiting()
+        self._wait_again()
         if self.scene:
-            self._learnt(self.scene)
+            scene = EmptyScene(self.scene)
+            self._seen_before(scene, *scene.silhouettes(self._task(None), []))
+            self.phase = "waiting"
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
@@ -68,8 +80,8 @@ class Session(LiveSession):
 
     @property
     def scenes(self) -> Sequence[list[Image]]:
-        """Pictures of the empty scene."""
-        return (self.scene,)
+        """Pictures of the empty scene; none of one that was never seen empty."""
+        return ([] if self._scene is None or self._scene.recovered else self._scene.pictures,)
 
     @property
     def measured(self) -> SizeFit:
@@ -96,62 +108,112 @@ class Session(LiveSession):
         return inverse(picture.camera.T_camera_world) @ picture.T_camera_base, None
 
     def begin_learning(self) -> None:
-        """Discard the collected pictures of the empty scene."""
-        self._collector = BackgroundCollector(self.settings.countdown, self.settings.learn)
+        """Discard the pictures collected so far. The person in a film cannot be asked to step out of the picture."""
+        usual = COUNTDOWN if self.watchdog.live else 0.0
+        self._collector = BackgroundCollector(usual if self.settings.countdown is None else self.settings.countdown, self.settings.learn)
 
     def begin_waiting(self) -> None:
-        """Start waiting until a person stands still."""
+        """Start waiting for a person to be measured, as they are from now on."""
+        self._wait_again()
+        self._since, self._refined = self.clock(), None
+
+    def _wait_again(self, message: str = "") -> None:
         self._still, self._recent = StandStillDetector(self.settings.still), []
+        self._still.message = message or self._still.message
 
     def _learn(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
-        scene = self._collector.see(shot.captured, images[0])
-        if scene is not None:
-            self._learnt(scene)
+        if self._collector.see(shot.captured, images[0]):
+            task = self._task(self.person)
+            task = task if self.fit is None else task._replace(fit=None)
+            self.phase, self._measured = "measuring", self.work(partial(look, task, list(self._collector.pictures.kept)))
         return Outcome(self._view(images))
 
     def _wait(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
+        if self._taken():
+            return Outcome(self._view(images))
         (mask,) = masks = self._masks(shot, images)
         self._recent = [*self._recent[-7:], images[0]]
-        still = self._still.see(shot.captured, mask)
-        if still is not None:
-            self.phase, self._measured = "measuring", self.work(self._fitting(still))
+        self._collector.pictures.add(shot.captured, images[0])
+        ready = self._still.see(shot.captured, mask)
+        if ready is not None:
+            assert self._scene is not None
+            self.phase, self._refined = "measuring", None
+            task = self._task(self.fit.guess if self.fit else self.person)
+            self._measured = self.work(partial(look_at, task, ready, self._scene, self._recent))
+        elif not self.scene:
+            self._look_again(shot.captured)
         return Outcome(self._view(images, masks))
 
-    def _fitting(self, masks: list[Mask]) -> Callable[[], SizeFit]:
-        """A task that fits sizes and place to the `masks` of a person standing still; only the place if the sizes are known."""
-        known = self.fit.guess if self.fit else self.person
-        sizes, height = (known.sizes, known.height) if known else (None, None)
-        height = height if self.fit else self.options.height or height
-        distance = None if self.fit else self.options.distance
-        return partial(find_person, self.rng.spawn(1)[0], self.camera, masks, height=height, distance=distance, sizes=sizes,
-                       body=self.options.tracker.body, settings=self.options.initialization)
-
     def _measure(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
-        """Check whether the fit is ready."""
-        fit: SizeFit | None = self._measured()
-        if fit is None:
+        """Check whether the task is ready."""
+        found: Found | None = self._measured()
+        if found is None:
             return Outcome(self._view(images, self._masks(shot, images)))
-        if np.median(list(fit.overlaps.values())) < LOST_OVERLAP:
-            self._still, self.phase = StandStillDetector(self.settings.still), "waiting"
-            self._still.message = "no person's shape: stand whole in the picture, facing the camera"
-            return Outcome(self._view(images))
-        self._learnt(self.scene, self._recent)
-        self.fit = fit
-        source = str(self.options.person) if self.options.person else "proportions, refined on who stood still"
-        self._begin_tracking(MonocularSubject.of(fit, self.camera, self.options.tracker, source, 1 / self.timing.interval))
+        self._seen_before(found.scene, found.tracked, found.clean)
+        self._due, self._between = shot.captured + FIRST_REFINED, FIRST_REFINED
+        if found.fit is not None:
+            self._begin(found.fit)
+        elif self.fit is not None and not found.tried:
+            self.phase, self._state, self._before = "tracking", None, None
+        else:
+            self.phase = "waiting"
+            self._wait_again("no person's shape: stand whole in the picture, facing the camera" if found.tried else "")
         return Outcome(self._view(images))
 
-    def _learnt(self, scene: list[Image], film: list[Image] | None = None) -> None:
-        """Learn the background from `scene`, and, from `film`, pictures with the person, also the blur of outlines."""
-        asked, clean = self.options.silhouette, clean_settings(self.options.silhouette)
+    def _track(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
+        lagging = self._lagging
+        given = () if not self._taken() or lagging is None else self._aged(lagging.rest())
+        outcome = super()._track(shot, images)
+        outcome = outcome._replace(given=(*given, *outcome.given))
+        if outcome.frame is not None and outcome.frame.status == "tracked":
+            self._collector.pictures.add(shot.captured, images[0])
+        self._look_again(shot.captured)
+        return outcome
 
-        def silhouettes(settings: SilhouetteSettings) -> Silhouettes:
-            return Silhouettes("live", learn_background(scene, settings, film=film or None, region=self._region), self._region)
+    def _task(self, known: Person | PersonEstimate | None) -> Task:
+        """What is wanted of pictures: silhouettes, and the person, or only the place of one whose sizes are `known`."""
+        again = self._since > -np.inf
+        sizes, height = (known.sizes, known.height) if known else (None, None)
+        height = self.options.height or height if isinstance(known, Person | None) else height
+        find = partial(find_person, self.rng.spawn(1)[0], self.camera, height=height, distance=None if again else self.options.distance,
+                       sizes=sizes, body=self.options.tracker.body, settings=self.options.initialization)
+        return Task(self.options.silhouette, self._region, find)
 
-        self.scene, self._silhouettes = scene, silhouettes(asked)
-        self._clean = self._silhouettes if clean == asked else silhouettes(clean)
-        self._segment = self._silhouettes.following()
-        self.phase, self._state, self._before = ("tracking" if self.fit else "waiting"), None, None
+    def _look_again(self, now: float) -> None:
+        """From time to time begin a new look at the pictures so far, for the person and for a scene that was not seen empty."""
+        if now < self._due or self._refined is not None:
+            return
+        self._between *= 2
+        self._due = now + self._between if self._between < LAST_REFINED else np.inf
+        before = None
+        if isinstance(self.subject, MonocularSubject) and self._clean is not None and self.phase == "tracking":
+            before = self.subject.picture, self._clean
+        pictures = list(self._collector.pictures.kept)
+        self._refined = self.work(partial(look, self._task(self.person), pictures, self._scene, self._since, before))
+
+    def _taken(self) -> bool:
+        """Whether a new look is ready, and shows a person better than before: then scene and person are as they were found in it."""
+        found = None if self._refined is None else self._refined()
+        if found is None:
+            return False
+        self._refined = None
+        if self.phase == "tracking" and (found.fit is None or found.overlap < found.before + GAIN):
+            return False
+        self._seen_before(found.scene, found.tracked, found.clean)
+        if found.fit is None:
+            return False
+        self._begin(found.fit)
+        return True
+
+    def _begin(self, fit: SizeFit) -> None:
+        """Track the person of a fit."""
+        self.fit = fit
+        source = str(self.options.person) if self.options.person else "proportions, refined on moments of the session"
+        self._begin_tracking(MonocularSubject.of(fit, self.camera, self.options.tracker, source, 1 / self.timing.interval))
+
+    def _seen_before(self, scene: EmptyScene, tracked: Silhouettes, clean: Silhouettes) -> None:
+        """Use new silhouettes before a scene."""
+        self._scene, self._clean, self._segment = scene, clean, tracked.following()
 
     def _scaled(self, shot: Snapshot) -> tuple[Image, ...]:
         return (scaled(shot.image, self.camera),)
@@ -159,11 +221,13 @@ class Session(LiveSession):
     def _masks(self, shot: Snapshot, images: tuple[Image, ...]) -> tuple[Mask, ...]:
         """The silhouette (H, W); before tracking a clean one, as measuring a person needs."""
         segment = self._segment if self.phase == "tracking" else self._clean
-        assert segment is not None
+        if segment is None:
+            return ()
         return (segment(CameraFrame(shot.captured, images[0], None)),)
 
     def _forget_time(self) -> None:
-        self._collector.wait()
+        if self.phase == "learning":
+            self._collector.wait()
         self._still.wait()
 
     def _shown(self, images: tuple[Image, ...], masks: tuple[Mask, ...], frame: MotionFrame | None) -> dict[str, Any]:
@@ -173,8 +237,9 @@ class Session(LiveSession):
     def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
         if self.phase == "tracking":
             hint = unfit(masks[0]) if masks else ""
-            gone = "the body does not fit any more: measure anew" if self._gone else ""
+            gone = "the body does not fit any more: measure again" if self._gone else ""
             return hint if hint.startswith("nearly all") else gone, None
         if self.phase == "learning":
             return self._collector.message, self._collector.left
-        return self._still.message if self.phase == "waiting" else "measuring: one moment", None
+        looking = "measuring: one moment" if self._scene is not None else "finding the empty scene, and measuring who is there"
+        return self._still.message if self.phase == "waiting" else looking, None

@@ -23,12 +23,12 @@ class LiveSettings:
     """Frames/s requested from a camera, or of a film without time stamps."""
     speed: Annotated[float, Field(gt=0, le=100)] = 1.0
     """Speed at which a film is played, as a multiple of its own."""
-    countdown: Seconds = 5.0
-    """Seconds to step out of the picture, before the empty scene is learnt."""
+    countdown: Seconds | None = None
+    """Seconds to step out of the picture, before the empty scene is looked for. Left out: 5, and 0 for a film."""
     learn: Annotated[float, Field(ge=0.3, le=600)] = 3.0
-    """Duration, in seconds, for which the empty scene is learnt."""
+    """Duration, in seconds, in which the empty scene is found: behind who moves, if there is a person."""
     still: Annotated[float, Field(ge=0.1, le=60)] = 1.0
-    """Seconds that a person must stand still to be measured."""
+    """Seconds after which a person who stands still is measured; one who moves is after three."""
     show: Literal["auto", "browser", "viewer", "none", "window"] = "auto"
     """Where the session is shown. browser: on a page, and its address is printed; auto: the same, and the page is opened if there is a
     screen; viewer: the puppet in space, on the page of `shadowpuppet view`."""

@@ -148,7 +148,7 @@ class Survey:
     """Silhouettes of the beginning, made by `clean`."""
     look: Look | RigLook
     census: Census | None = None
-    """The number of people and their room, with several cameras."""
+    """The number of people and their floor, with several cameras."""
 
     @property
     def several(self) -> bool:

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shadowpuppet.camera.drawing import BLACK, SILHOUETTE_ONLY, WHITE, draw_model, in_colour, write_text
+from shadowpuppet.camera.drawing import BLACK, LEGEND, SILHOUETTE_ONLY, WHITE, draw_model, in_colour, said_of, write_text, write_words
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.motion.limbs import doubtful_limbs
-from shadowpuppet.motion.motion import MotionFrame
+from shadowpuppet.motion.limbs import LIMBS, doubtful_limbs
+from shadowpuppet.motion.motion import BLANK, MotionFrame
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.video import Image
@@ -21,12 +21,15 @@ SHOWN = 0.55
 """Opacity of the model."""
 
 
-def overlay_grid(frames: FrameSet, found: MotionFrame, pictures: Sequence[Picture]) -> Image:
+def overlay_grid(frames: FrameSet, found: MotionFrame, pictures: Sequence[Picture], last: MotionFrame | None = None) -> Image:
     """An image (H, W, 3), blue green red, with a tile for each camera that shows the model in its pose and the silhouette's outline.
 
-    `pictures`: the body as each camera sees it; limbs that are not vouched for are pale. A camera without a frame is black; without a
-    pose no model is drawn.
+    `pictures`: the body as each camera sees it; limbs that are not vouched for are pale. A camera without a frame is black. Without a
+    pose the model is drawn as it was `last`, all pale, or not at all.
     """
+    if found.status in BLANK and last is not None:
+        pale = last._replace(limb_status=["predicted"] * len(LIMBS))
+        return _grid(frames, [(pale, pictures)], said_of(found.status, last.time))
     named = ", ".join(doubtful_limbs(pictures[0].body.landmark_names, found.limb_status)).replace("_", " ")
     return _grid(frames, [(found, pictures)], found.status if not named else f"{found.status}, {named} doubtful")
 
@@ -54,6 +57,7 @@ def _grid(frames: FrameSet, people: Sequence[tuple[MotionFrame, Sequence[Picture
         drawn = [(pictures[n], found) for found, pictures in people if found.pose is not None]
         _fit(tile, None if image is None else _tile(image, mask, drawn))
         write_text(tile, name if image is not None else f"{name}: no picture", 0, WHITE, size=height)
+    write_words(out, out.shape[0] - 65, (*LEGEND, ("outline: silhouette", SILHOUETTE_ONLY)), max(360, height))
     write_text(out, f"{frames.time:.2f} s  {words}", out.shape[0] - 40, WHITE, size=max(360, height))
     return out
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from shadowpuppet.body.models import WHOLE
 from shadowpuppet.body.sizes import CardboxSizes
+from shadowpuppet.body.upper_body import TWIST
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import overlay_frame
 from shadowpuppet.camera.mask import Mask, may_be_person
@@ -38,7 +39,7 @@ from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.tracking.particle_filter import Particles
-from shadowpuppet.tracking.smoothing.facing import NEAR, TWIST
+from shadowpuppet.tracking.smoothing.facing import NEAR
 from shadowpuppet.tracking.smoothing.head_lean import head_lean
 from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
 from shadowpuppet.tracking.unexplained import Unexplained, left_out, look_beside, looks_in
@@ -145,14 +146,15 @@ class MonocularSubject(TrackedSubject):
         """Landmarks (N, L, 3) of poses (N, D) in the world, metres."""
         return self.picture.points_world(poses)
 
-    def draw(self, frames: FrameSet, found: MotionFrame) -> Image:
+    def draw(self, frames: FrameSet, found: MotionFrame, last: MotionFrame | None = None) -> Image:
         """Model, matching result and raw picture, one below the other."""
         image, mask = frames.images[0], self.observe(frames.masks)
         assert image is not None
         pose = np.full(len(self.body.skeleton.dofs), np.nan) if found.pose is None else np.asarray(found.pose)
         ignored = mask & self.picture.legs(pose) if found.pose is not None and self.tracker.settings.ignore_legs else None
         return overlay_frame(image, mask, self.picture, pose, status=found.status, time=found.time, overlap=found.overlap, ignore=ignored,
-                             doubtful=doubtful_names(self.body, found.limb_status))
+                             doubtful=doubtful_names(self.body, found.limb_status),
+                             last=None if last is None or last.pose is None else (last.pose, last.time))
 
 
 def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) -> MonocularSubject:

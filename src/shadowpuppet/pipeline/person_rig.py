@@ -55,6 +55,8 @@ class MultiviewSubject(TrackedSubject):
 
     tracker: MultiviewTracker
     hull: VisualHull
+    is_measured: bool = True
+    """Whether the sizes are the person's own, not average ones."""
     state_types = (MultiviewState, Particles, Unexplained, Before, Trail)
 
     def observe(self, masks: Sequence[Mask | None]) -> HullObservation:
@@ -102,9 +104,9 @@ class MultiviewSubject(TrackedSubject):
         """`lost` if a camera still sees a person, else `absent`."""
         return "lost" if observation.people else "absent"
 
-    def draw(self, frames: FrameSet, found: MotionFrame) -> Image:
+    def draw(self, frames: FrameSet, found: MotionFrame, last: MotionFrame | None = None) -> Image:
         """A grid of the cameras' images with the model and the silhouettes."""
-        return overlay_grid(frames, found, self.pictures)
+        return overlay_grid(frames, found, self.pictures, last)
 
     @cached_property
     def pictures(self) -> list[Picture]:
@@ -152,6 +154,18 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
     return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull, tracker=tracker,
                             beside=tuple(_beside(each, picture.mask(person.pose), camera.size)
                                          for each, picture, camera in zip(person.unexplained, tracker.views.pictures, cameras)))
+
+
+def average_person(rng: np.random.Generator, cameras: Sequence[Camera], options: Options, rate: float, height: float) -> MultiviewSubject:
+    """A person of average sizes for a height, metres, as `fit_in_views` makes one who cannot be measured."""
+    settings = options.multiview
+    known, sizes = familiar(rng, options, None, settings.body, rate), average_sizes(settings.body, height)
+    source, prior = "the height alone: not seen apart from other people", known.prior if settings.method == "hybrid" else None
+    tracker = MultiviewTracker(make_body(settings.body, sizes), tuple(cameras), settings, prior,
+                               known.poses if len(known.poses) else None, looks=looks_in(settings.patience, rate))
+    summary = {"source": source, "sizes": dict(zip(sizes.names(), map(float, sizes.to_array()), strict=True))}
+    return MultiviewSubject(body=tracker.body, person=Person(sizes, height, source), summary=summary,
+                            hull=VisualHull(cameras, settings.hull), tracker=tracker, is_measured=False)
 
 
 def _beside(unexplained: Unexplained | None, body: Mask, size: tuple[int, int]) -> BesideBody | None:

@@ -206,5 +206,5 @@ def evaluated(rig: Rig, motion: Motion) -> dict[str, Any]:
             truth = truth.between(rig.recording.begin, np.inf if rig.recording.duration is None else rig.recording.duration)
         return evaluate(motion, truth, camera=camera, cameras=cameras)
     except ShadowPuppetError as error:  # the run is complete: a bad truth file must not discard it
-        warn(f"no errors are told: {error}", ShadowPuppetWarning, stacklevel=2)
+        warn(f"no errors are computed: {error}", ShadowPuppetWarning, stacklevel=2)
         return evaluate(motion, camera=camera, cameras=cameras)

@@ -89,8 +89,8 @@ class TrackedSubject(ABC):
         """Doubt about the estimate of an observation at a time (s), and what the next frame's needs: its `before`, at first None."""
 
     @abstractmethod
-    def draw(self, frames: FrameSet, found: MotionFrame) -> Image:
-        """A frame of overlay.mp4, (H, W, 3), blue green red."""
+    def draw(self, frames: FrameSet, found: MotionFrame, last: MotionFrame | None = None) -> Image:
+        """A frame of overlay.mp4, (H, W, 3), blue green red. `last`: the last frame with a pose, shown pale where this one has none."""
 
     def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed]:
         """Observations of frame sets, one after another."""

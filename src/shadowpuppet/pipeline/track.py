@@ -15,9 +15,10 @@ import numpy as np
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.people import person_folder
 from shadowpuppet.io.person import write_person
-from shadowpuppet.io.run import OWN_KEYS, RunWriter, read_run, write_metrics
+from shadowpuppet.io.run import read_run
+from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter, write_metrics
 from shadowpuppet.jit import is_compiled
-from shadowpuppet.motion.motion import MotionFrame
+from shadowpuppet.motion.motion import BLANK, MotionFrame
 from shadowpuppet.pipeline.look import Look, RigLook, Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
@@ -47,7 +48,8 @@ from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig, read_frames
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names, motion_frame
-from shadowpuppet.pipeline.survey import survey_camera, survey_rig
+from shadowpuppet.pipeline.survey.camera import survey_camera
+from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
@@ -132,7 +134,7 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
     `cache` keeps silhouettes for the next run of the same recording; a run that used them has `kept_silhouettes` in metrics.json.
     `resume`: an earlier run in the folder, of the same recording, settings and versions, goes on from its last checkpoint, which is made
     about every second; the look and the silhouettes before are made again, and the result is that of a run that was never broken off. A
-    folder without a checkpoint is tracked from the first frame; a complete run raises `io.run.CompleteRun`.
+    folder without a checkpoint is tracked from the first frame; a complete run raises `io.run_writer.CompleteRun`.
 
     In addition to the files that `io.run` describes, the folder gets look.json, person.toml (the sizes), calibration.toml (the cameras)
     and, if asked for, overlay.mp4. An interrupted run keeps the frames tracked so far. The same options, films and machine give the same
@@ -261,8 +263,10 @@ def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]]
         return
     turned = found.motion.times[1:][np.diff(found.mirrored.astype(int)) != 0]
     if len(turned):
+        first, other = ("looked away", "camera") if away else ("faced the camera", "away")
         warn(f"the person seems to have turned round at {', '.join(f'{time:.1f}' for time in turned)} s: left and right are exchanged from "
-             "there on, which one camera cannot see; --smooth off leaves them as tracked", ShadowPuppetWarning, stacklevel=3)
+             f"there on, which one camera cannot see, nor that they {first} at first, as was assumed (--facing {other} if not); --smooth "
+             "off leaves them as tracked", ShadowPuppetWarning, stacklevel=3)
     writer.revise(found.motion)
     counts = {"bridged_frames": found.bridged, "turned_frames": found.mirrored, "reversed_frames": found.reversed}
     writer.info["smoothing"] = {**parts[0][1].summary, **{name: int(frames.sum()) for name, frames in counts.items()}}
@@ -308,7 +312,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
     writer.begin()
     write_beside(writer.folder, prepared.look, survey.rig, prepared.check().person)
     watch, count, due = RigWatch(len(survey.rig.footage)), len(earlier), 0.0
-    leans = array("d")
+    leans, last = array("d"), None
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
     listener.begin("tracking", tracked(prepared.look.frames, options.every))
     began = time.perf_counter()
@@ -324,8 +328,9 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
             for found, seen in zip(earlier, frames):
                 watch.tracked(subject.drawn(found))
                 leans.append(subject.lean(found, seen.masks))
+                last = last if found.status in BLANK else found
                 if overlay is not None:
-                    overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found))
+                    overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found, last))
             observed = stack.enter_context(closing(subject.observations(frames)))
             for seen, observation, seconds in timer.each("wait", observed):
                 timer.add(decode=seen.decoding, segment=seen.segmenting, hull=seconds)
@@ -336,10 +341,11 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                 with timer.time("doubt"):
                     found, before = motion_frame(subject, seen.time, state, observation, before)
                 leans.append(subject.lean(found, seen.masks))
+                last = last if found.status in BLANK else found
                 with timer.time("write"):
                     writer.write(found)
                     if overlay is not None:
-                        overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found))
+                        overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found, last))
                     if (now := time.perf_counter()) >= due:
                         writer.checkpoint(Carried(look, rng.bit_generator.state, subject.kept(state), before, left_out))
                         due = time.perf_counter() + max(CHECKPOINT_SECONDS, CHECKPOINT_COST * (time.perf_counter() - now))

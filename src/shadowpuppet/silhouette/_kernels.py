@@ -94,7 +94,7 @@ def watch(label, held, planes, scene, shift, inverse_sigma, factor, ages, slow, 
 
     1 in `due`: they have looked alike, unlike the background, for long enough; 2: the same beside pixels that have changed, or they look,
     for the second time, like the scene as learnt, or as if the scene there had changed as it has around them. A pixel on or near the person
-    that looks as before neither ages nor starts anew.
+    that looks as before neither ages nor starts again.
 
     label: of the pixels (H, W), 0 background; held (H, W): 2 on the person, 1 near them, else 0; planes (H, W, 3), uint8, Y, Cr, Cb,
     smoothed; scene: the same as learnt, and shift: how the background has changed around a pixel, 0 where it has not, both (H, W, 3),
@@ -102,7 +102,7 @@ def watch(label, held, planes, scene, shift, inverse_sigma, factor, ages, slow, 
     the person was not, and where they were.
 
     State: slow (H, W, 3), mean of what a pixel has looked like; age (H, W), how often; before (H, W), 1 where the person was since it was
-    background last, 2 more where it was explained the last time. A due pixel starts anew.
+    background last, 2 more where it was explained the last time. A due pixel starts again.
     """
     number = 0
     for y in range(label.shape[0]):

@@ -147,7 +147,7 @@ class Spec:
                 raise ValueError(f"scene.obstacles: found a {kind} where the camera {view.name!r} stands")
         for view, other in itertools.product(self.views() if self.scene.bystanders else (), self.scene.bystanders):
             if np.hypot(*(view.camera().centre[:2] - (other.left, -other.ahead))) < 0.4:
-                raise ValueError(f"scene.bystanders: found somebody where the camera {view.name!r} stands")
+                raise ValueError(f"scene.bystanders: found a person where the camera {view.name!r} stands")
 
         for n, fault in enumerate(self.faults):
             known = [view.name for view in self.views()]

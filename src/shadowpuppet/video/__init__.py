@@ -11,13 +11,13 @@ import numpy as np
 
 from shadowpuppet.errors import VideoError
 from shadowpuppet.video.camera_device import camera_number, open_camera
-from shadowpuppet.video.film import open_film
+from shadowpuppet.video.film import FILM_SUFFIXES, open_film
 from shadowpuppet.video.frames import Frame, FrameSource, Image, Size
 from shadowpuppet.video.images import IMAGE_SUFFIXES, open_folder, open_picture, read_image, write_image
 from shadowpuppet.video.writer import FrameWriter, write_frames
 
-__all__ = ["IMAGE_SUFFIXES", "Frame", "FrameSource", "FrameWriter", "Image", "Size", "camera_number", "open_frames", "read_image",
-           "write_frames", "write_image"]
+__all__ = ["FILM_SUFFIXES", "IMAGE_SUFFIXES", "Frame", "FrameSource", "FrameWriter", "Image", "Size", "camera_number", "open_frames",
+           "read_image", "write_frames", "write_image"]
 
 
 def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | None = None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from collections.abc import Callable
 from typing import Generic, Self, TypeVar
 
@@ -13,6 +14,8 @@ from shadowpuppet.video.live_source import Feed, Snapshot
 Item = TypeVar("Item")
 FIRST_WAIT, LONGEST_WAIT = 0.5, 8.0
 """Seconds before a camera that broke off is opened again; the wait doubles each time."""
+NAP = 0.1
+"""Seconds after which a film that stands still looks whether it is to end."""
 
 
 class Newest(Generic[Item]):
@@ -63,7 +66,8 @@ class Capture:
         """Whether a film is over."""
         self.error: BaseException | None = None
         """An error that ended reading, other than a camera's breaking off."""
-        self._stop, self._again = threading.Event(), threading.Event()
+        self._stop, self._again, self._goes_on = threading.Event(), threading.Event(), threading.Event()
+        self._goes_on.set()
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)
 
     def __enter__(self) -> Self:
@@ -79,6 +83,21 @@ class Capture:
     def again(self) -> None:
         """Close and reopen the camera, for one whose picture is frozen."""
         self._again.set()
+
+    def hold(self, still: bool) -> None:
+        """Let a film stand `still`, or go on; a camera never stands still."""
+        (self._goes_on.clear if still else self._goes_on.set)()
+
+    def _held(self) -> float:
+        """Wait while a film stands still; the seconds that it did."""
+        before = time.monotonic()
+        while not (self.feed.live or self._stop.is_set() or self._goes_on.wait(NAP)):
+            pass
+        held = time.monotonic() - before
+        if held < NAP:
+            return 0.0
+        self.feed.put_off(held)
+        return held
 
     def _run(self) -> None:
         try:
@@ -117,5 +136,5 @@ class Capture:
                 if self._stop.is_set() or self._again.is_set():
                     break
                 self.problem, came = "", True
-                self.newest.put(shot._replace(number=self.newest.put_count))
+                self.newest.put(shot._replace(captured=shot.captured + self._held(), number=self.newest.put_count))
         return came

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from av.container import InputContainer
     from av.video.stream import VideoStream
 
+FILM_SUFFIXES = (".264", ".3gp", ".avi", ".flv", ".gif", ".h264", ".hevc", ".m2ts", ".m4v", ".mjpeg", ".mkv", ".mov", ".mp4",
+                 ".mpeg", ".mpg", ".mts", ".mxf", ".ogv", ".ts", ".webm", ".wmv", ".y4m")
+"""Endings of films that are found in a folder; others must be named."""
 PLAIN_LUMA = re.compile(r"yuvj?4\d\dp|nv12|nv16|nv21|gray")
 """Pixel formats whose first plane is the 8-bit luma."""
 DEEP_LUMA = re.compile(r"yuv|p[024]1|gray1")

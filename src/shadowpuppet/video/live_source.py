@@ -23,8 +23,6 @@ ADDRESS = re.compile(r"([a-z][a-z0-9+.-]*)://", re.IGNORECASE)
 """Beginning of a network address."""
 MAX_DELAY = 1.0
 """Seconds by which a film may lag behind its clock before the clock is set back."""
-
-
 class Snapshot(NamedTuple):
     """A picture from a feed."""
 
@@ -50,6 +48,8 @@ class Feed:
     """Whether the source is live, and reopened if it ends; False for films."""
     read: Callable[[], Iterator[Snapshot]] = field(repr=False)
     """Pictures as they come, until the source ends. Raises `VideoError` if it cannot be opened or breaks off."""
+    put_off: Callable[[float], None] = field(default=lambda seconds: None, repr=False)
+    """Tells a film that it stood still for some seconds: it goes on where it was."""
 
 
 def open_feed(source: str | int, *, rate: float | None = None, speed: float = 1.0, start: str | None = None,
@@ -104,11 +104,17 @@ def _stream(address: str) -> Feed:
 def film_feed(film: FrameSource, speed: float = 1.0, clock: Callable[[], float] = time.monotonic,
               wait: Callable[[float], None] = time.sleep) -> Feed:
     """A feed that plays a film as if live: each frame comes when it is due, and that is its time of capture."""
+    delay = 0.0
+
+    def put_off(seconds: float) -> None:
+        nonlocal delay
+        delay += seconds
 
     def read() -> Iterator[Snapshot]:
-        start, warned = math.nan, False
+        start, delayed, warned = math.nan, delay, False
         for time_, image in film:
             start = clock() - time_ / speed if math.isnan(start) else start
+            start, delayed = start + delay - delayed, delay
             due = start + time_ / speed
             while (ahead := due - clock()) > 0:
                 wait(ahead)
@@ -120,7 +126,7 @@ def film_feed(film: FrameSource, speed: float = 1.0, clock: Callable[[], float] 
                 warned = True
             yield Snapshot(due, image, time_)
 
-    return Feed(film.name, film.size, film.rate * speed, False, read)
+    return Feed(film.name, film.size, film.rate * speed, False, read, put_off)
 
 
 def _timed(path: Path, rate: float | None) -> FrameSource:

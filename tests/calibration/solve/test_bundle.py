@@ -122,7 +122,7 @@ def test_a_camera_that_never_sees_the_board_is_named(rig):
         place_cameras(bare(rig), boards.BOARD, [{n: view for n, view in moment.items() if n != 3} for moment in views])
 
 
-def test_a_board_with_the_pattern_on_both_sides_is_told():
+def test_a_board_with_the_pattern_on_both_sides_is_reported():
     rig = boards.ring(2)  # opposite each other
     views, _ = boards.moments(rig, np.random.default_rng(3), 60, two_sided=True)
     with pytest.raises(CalibrationError, match="two sides of the board"):
@@ -148,7 +148,7 @@ def test_a_fisheye_is_found_to_be_one():
     assert abs(fit.camera.matrix[0, 0] / 420 - 1) < 0.01
 
 
-def test_a_board_held_square_at_one_distance_is_told():
+def test_a_board_held_square_at_one_distance_is_reported():
     camera = boards.ring(1)[0]
     views = boards.shown(camera, np.random.default_rng(2), 40, tilt=2.0, distances=(1.5, 1.52))
     said = lens_advice(solve_lens("cam1", boards.BOARD, views, boards.SIZE))

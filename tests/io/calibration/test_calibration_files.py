@@ -113,6 +113,13 @@ def test_a_bad_field_is_said_with_file_section_and_field(tmp_path, changes, said
     assert len(str(error.value)) < 500
 
 
+def test_a_camera_may_stand_a_hundred_metres_off(tmp_path):
+    camera = read(tmp_path, section(translation="[60.0, 0.0, 80.0]"))[0]
+    assert np.linalg.norm(camera.centre) == pytest.approx(100)
+    with pytest.raises(CalibrationError, match=r"translation: found .*, 100\.001 long, expected at most 100 metres"):
+        read(tmp_path, section(translation="[0.0, 0.0, 100.001]"))
+
+
 def test_two_cameras_of_one_name_are_said(tmp_path):
     with pytest.raises(CalibrationError, match=r"\[b\]: name: found 'left', which another section has"):
         read(tmp_path, section("a") + section("b"))

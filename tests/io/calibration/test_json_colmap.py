@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import inverse
-from shadowpuppet.io.calibration.calibration_files import examine_calibration, find_calibration, is_calibration, read_calibration
+from shadowpuppet.io.calibration.calibration_files import examine_calibration, read_calibration
+from shadowpuppet.io.calibration.formats import find_calibration, is_calibration
 
 MADE = calibrations.cameras(2)
 

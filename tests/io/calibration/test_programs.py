@@ -17,17 +17,16 @@ from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import (
     UPS,
     examine_calibration,
-    find_calibration,
-    is_calibration,
     read_calibration,
     rotated_up,
     write_calibration,
 )
+from shadowpuppet.io.calibration.formats import find_calibration, is_calibration
 from shadowpuppet.io.calibration.opencv_storage import read_storage
 from shadowpuppet.io.calibration.vicon import ViconDistortion, opencv_distortion
 from shadowpuppet.io.recording import read_recording
 
-KINDS = ("anipose.toml", "freemocap.toml", "camera_array.toml", "Calib.qca.txt", "easy", "cal", "yaml", "xml")
+KINDS = ("anipose.toml", "freemocap.toml", "camera_array.toml", "Calib.qca.txt", "easy", "cal", "yaml", "xml", "KRT", "biocv")
 """That hold OpenCV's own lens; Vicon's is another."""
 SCRATCH = [HealthCheck.function_scoped_fixture]
 
@@ -65,9 +64,10 @@ def test_every_kind_tells_the_same_cameras(files, made, kind, rng):
 
 @pytest.mark.parametrize(("kind", "unit", "told"), [
     ("freemocap.toml", "mm", True), ("Calib.qca.txt", "mm", True), ("session.xcp", "mm", True), ("cal", "mm", True),
+    ("biocv", "mm", True), ("KRT", "m", False), ("camchain.yaml", "m", True),
     ("anipose.toml", "m", False), ("easy", "m", False),
 ])
-def test_what_lengths_are_in_is_told(files, kind, unit, told):
+def test_what_lengths_are_in_is_reported(files, kind, unit, told):
     found = examine_calibration(files[kind])
     assert (found.unit, found.unit_known) == (unit, told)
 
@@ -147,7 +147,7 @@ def test_vicon_s_distortion_over_the_focal_length_is_known_by_its_size(tmp_path,
     np.testing.assert_allclose(read_calibration(path)[0].distortion, read_calibration(other)[0].distortion, atol=1e-12)
 
 
-def test_a_distortion_that_opencv_cannot_follow_is_told():
+def test_a_distortion_that_opencv_cannot_follow_is_reported():
     matrix = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
     straight, none = opencv_distortion(matrix, np.array([640, 480]), ViconDistortion(np.array([320.0, 240]), np.zeros(3)))
     assert np.abs(straight).max() < 1e-12

@@ -137,7 +137,7 @@ BAD_AMC = [
 
 
 @pytest.mark.parametrize(("break_", "words"), BAD_AMC)
-def test_malformed_motions_are_told_by_line(tmp_path, break_, words):
+def test_malformed_motions_are_reported_by_line(tmp_path, break_, words):
     path, _ = acclaim.write(tmp_path)
     path.write_text(break_(path.read_text("utf-8")), "utf-8")
     with pytest.raises(FormatError, match=words) as caught:
@@ -167,7 +167,7 @@ BAD_ASF = [
 
 
 @pytest.mark.parametrize(("break_", "words"), BAD_ASF)
-def test_malformed_skeletons_are_told_by_line(tmp_path, break_, words):
+def test_malformed_skeletons_are_reported_by_line(tmp_path, break_, words):
     acclaim.write(tmp_path)
     path = tmp_path / "01.asf"
     path.write_text(break_(path.read_text("utf-8")), "utf-8")

@@ -134,7 +134,7 @@ def test_one_file_has_one_kind_of_positions(tmp_path, added):
     np.testing.assert_allclose(found, [[0.5, -39.5, 0], [0.5, -41.4, 0.3]] if added else [[0.5, -39.5, 0], [0.5, -39.3, 0.3]])
 
 
-def test_joints_of_one_name_are_told_apart(tmp_path):
+def test_joints_of_one_name_are_distinguished(tmp_path):
     assert read(tmp_path, TEXT.replace("Knee", "Hips")).joints().names == ("Hips", "Hips#2", "Hips_end")
 
 

@@ -126,7 +126,7 @@ def test_more_frames_and_names_than_a_byte_or_two_can_tell_are_written(tmp_path)
         np.testing.assert_allclose(found.positions, table.positions, atol=1e-6)
 
 
-def test_frames_that_are_missing_are_told(tmp_path):
+def test_frames_that_are_missing_are_reported(tmp_path):
     content = c3d(NAMES, PLACES)
     with pytest.warns(ShadowPuppetWarning, match=r"walk\.c3d: found 2 frames, but it tells of 3; those are used"):
         assert len(read(tmp_path, content[:-5]).times) == 2

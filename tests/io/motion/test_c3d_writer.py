@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.motion.c3d import read_c3d, read_header
 from shadowpuppet.io.motion.c3d_writer import write_c3d
+from shadowpuppet.motion.contact.contact import FootEvent
 from shadowpuppet.motion.motion import JointTable
 
 
@@ -129,7 +130,7 @@ def test_more_names_than_one_list_can_hold(tmp_path, rng):
     assert read_c3d(tmp_path / "many.c3d").names == made.names
 
 
-def test_missing_frames_are_unknown_and_odd_times_found_anew(tmp_path, rng):
+def test_missing_frames_are_unknown_and_odd_times_found_again(tmp_path, rng):
     whole = table(rng)
     kept = np.delete(np.arange(20), [7, 8])
     write_c3d(tmp_path / "a.c3d", JointTable(whole.times[kept], whole.names, whole.positions[kept]))
@@ -155,3 +156,15 @@ def test_what_cannot_be_written_is_said(tmp_path, rng):
     with pytest.raises(ShadowPuppetError, match="expected points"):
         write_c3d(tmp_path / "a.c3d", table(rng, 3, []))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_events_of_the_feet_are_there(tmp_path, rng):
+    events = [FootEvent(0.5, "left", True), FootEvent(61.25, "right", False)]
+    write_c3d(tmp_path / "a.c3d", table(rng), events=events)
+    reader, _ = theirs(tmp_path / "a.c3d")
+    assert reader.get("EVENT:USED").uint16_value == 2
+    np.testing.assert_allclose(reader.get("EVENT:TIMES").float_array.reshape(2, 2), [[0, 0.5], [1, 1.25]])
+    assert [word.strip() for word in reader.get("EVENT:LABELS").string_array] == ["Foot Strike", "Foot Off"]
+    assert [word.strip() for word in reader.get("EVENT:CONTEXTS").string_array] == ["Left", "Right"]
+    write_c3d(tmp_path / "b.c3d", table(rng))
+    assert theirs(tmp_path / "b.c3d")[0].get("EVENT") is None

@@ -154,11 +154,13 @@ def test_joints_of_another_body_are_doubted_or_refused(rng):
                 train(odd)
 
 
-def test_who_does_not_move_is_told(rng):
+def test_who_does_not_move_is_reported(rng):
     table, _ = walk(1)
-    still = JointTable(np.arange(40) / 60, table.names, np.repeat(table.positions, 40, 0) + 2e-4 * rng.standard_normal((40, 17, 3)))
-    with pytest.warns(ShadowPuppetWarning, match="clip 0: nobody moves there"):
+    places = np.repeat(table.positions, 40, 0)
+    still = JointTable(np.arange(40) / 60, table.names, places + 2e-4 * rng.standard_normal(places.shape))
+    with pytest.warns(ShadowPuppetWarning, match="clip 0: nobody moves there") as warned:
         train(still)
+    assert {warning.filename for warning in warned} == {__file__}  # the caller's line, not ours
 
 
 @settings(max_examples=30, deadline=None)

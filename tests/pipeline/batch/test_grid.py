@@ -62,7 +62,7 @@ def recording(tmp_path) -> Path:
 @pytest.mark.parametrize(("said", "meant"), [
     ("0:10", range(10)), ("3", [3]), ("1,5,9", [1, 5, 9]), ("0:10:3", [0, 3, 6, 9]), ("0:2, 7", [0, 1, 7]), (4, [4]), ([2, 1], [2, 1]),
 ])  # fmt: skip
-def test_seeds_are_told_in_many_ways(said, meant):
+def test_seeds_are_reported_in_many_ways(said, meant):
     assert seeds_of(said) == tuple(meant)
 
 
@@ -110,7 +110,7 @@ def test_flags_hold_over_the_file_and_may_not_be_varied(written):
         read_grid(path, {"tracker": {"arm": {"particles": 50}}})
 
 
-def test_files_are_told_from_the_grids_folder_on(written, tmp_path):
+def test_files_are_reported_from_the_grids_folder_on(written, tmp_path):
     grid = read_grid(written('calibration = "rig.toml"\n[grid]\nprior = ["a.npz", "b.npz"]\n[case.x]\nperson = "me.toml"\n'))
     values = grid.cases[1].values
     assert [values["calibration"], values["prior"], values["person"]] == [str(tmp_path / name) for name in ("rig.toml", "b.npz", "me.toml")]
@@ -213,7 +213,7 @@ def test_files_that_settings_name_are_content_too(recording, tmp_path):
     assert ids(recording, {"person": str(moved)}) != first
 
 
-def test_long_files_are_told_apart_by_their_ends(tmp_path):
+def test_long_files_are_distinguished_by_their_ends(tmp_path):
     film, prints = tmp_path / "film.mp4", set()
     for start, end, size in ((b"a", b"z", 10**6), (b"b", b"z", 10**6), (b"a", b"y", 10**6), (b"a", b"z", 10**6 + 1)):
         film.write_bytes(start + bytes(size) + end)
@@ -228,7 +228,7 @@ def test_tasks_whose_silhouettes_are_the_same_are_of_one_film(recording):
     assert len({task.film for task in make_tasks([recording], cases, [0, 1])}) == 4
 
 
-def test_recordings_of_one_name_are_told_apart(tmp_path):
+def test_recordings_of_one_name_are_distinguished(tmp_path):
     tasks = make_tasks([tmp_path / "a" / "walk", tmp_path / "b" / "walk", tmp_path / "c" / "run"], make_grid().cases, [0])
     assert [task.name for task in tasks] == ["a-walk", "b-walk", "c-run"]
     assert len({task.id for task in tasks}) == len({task.folder for task in tasks}) == 3

@@ -10,51 +10,54 @@ import pytest
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.pipeline.people import group as module
 from shadowpuppet.pipeline.people.group import GONE_SECONDS, Group, first_people
-from shadowpuppet.tracking.people.columns import Column
+from shadowpuppet.tracking.people.figures import Figure
+from shadowpuppet.tracking.people.tracker import Begun, Share
+from shadowpuppet.tracking.people.walking import Step
 
 STEP = 0.1
 
 
-def column(x: float, height: float = 1.7) -> Column:
-    return Column(np.array([x, 0.0]), height, 0.1, np.zeros((0, 3), np.int64))
+def figure(x: float, height: float = 1.7) -> Figure:
+    return Figure(np.array([x, 0.0]), height)
 
 
 @pytest.fixture
 def scene(monkeypatch):
-    """A group whose trackers follow people to their column, and are lost where there is none; `columns` are those seen now."""
-    now = SimpleNamespace(columns=[], fits=0, refuse=False)
+    """A group whose trackers follow people to their figure, and are lost where there is none; `figures` are those seen now."""
+    now = SimpleNamespace(figures=[], fits=0, refuse=False, facing=np.array([1.0, 0.0]), sided=True, measured=True)
 
     def fit(rng, sets):
         if now.refuse:
             raise TrackingError("nobody")
         now.fits += 1
-        return SimpleNamespace(tracker=None, body=None)
+        return SimpleNamespace(tracker=None, body=None, is_measured=now.measured)
 
     def place(state):
-        return min((each.place for each in now.columns), key=lambda other: abs(other[0] - state.place[0]), default=np.full(2, 99.0))
+        return min((each.place for each in now.figures), key=lambda other: abs(other[0] - state.place[0]), default=np.full(2, 99.0))
 
     def step(people, points, masks):
         found = {}
         for number, person in people.items():
             near = abs(place(person.state)[0] - person.state.place[0]) < 0.4
             where = place(person.state) if near else person.state.place
-            state = SimpleNamespace(place=where, status="tracked" if near else "lost")
-            found[number] = SimpleNamespace(state=state, drawn=None)
+            state = SimpleNamespace(place=where, pose=where, status="tracked" if near else "lost")
+            found[number] = Share(state, None, [], None)
         return found
 
-    def start(tracker, rng, column, drawn, points, masks):
-        return SimpleNamespace(place=column.place, status="tracked")
+    def start(tracker, rng, figure, drawn, points, masks):
+        return Begun(SimpleNamespace(place=figure.place, pose=figure.place, status="tracked"), now.sided)
 
-    monkeypatch.setattr(module, "find_people", lambda room, masks, explained=(): list(now.columns))
+    monkeypatch.setattr(module, "find_people", lambda floor, masks, explained=(): list(now.figures))
     monkeypatch.setattr(module, "explained", lambda drawn, number: [])
     monkeypatch.setattr(module, "place_of", lambda body, state: state.place)
     monkeypatch.setattr(module, "step", step)
     monkeypatch.setattr(module, "start", start)
+    monkeypatch.setattr(module, "step_of", lambda body, pose, time: Step(time, pose[:2], now.facing))
     now.group = Group(None, None, fit, np.random.default_rng(0))
     now.time = 0.0
 
-    def run(seconds: float, *columns: Column) -> list[int]:
-        now.columns = list(columns)
+    def run(seconds: float, *figures: Figure) -> list[int]:
+        now.figures = list(figures)
         for _ in range(round(seconds / STEP)):
             now.group.next(now.time, None, [None])
             now.time += STEP
@@ -65,43 +68,83 @@ def scene(monkeypatch):
 
 
 def test_who_stays_is_a_person_and_who_flickers_is_none(scene):
-    assert scene.run(0.4, column(0)) == []
+    assert scene.run(0.4, figure(0)) == []
     assert scene.run(1.0) == []
-    assert scene.run(1.0, column(0)) == [1]
+    assert scene.run(1.0, figure(0)) == [1]
     assert scene.fits == 1
 
 
 def test_a_second_person_comes(scene):
-    scene.run(1.0, column(0))
-    assert scene.run(1.0, column(0), column(2)) == [1, 2]
-    assert scene.run(1.0, column(0.1), column(1.9)) == [1, 2]
+    scene.run(1.0, figure(0))
+    assert scene.run(1.0, figure(0), figure(2)) == [1, 2]
+    assert scene.run(1.0, figure(0.1), figure(1.9)) == [1, 2]
     assert scene.fits == 2
 
 
 def test_who_leaves_is_absent_after_a_second(scene):
-    scene.run(1.0, column(0), column(2))
-    assert scene.run(GONE_SECONDS - 0.2, column(0)) == [1, 2]
-    assert scene.run(0.5, column(0)) == [1]
+    scene.run(1.0, figure(0), figure(2))
+    assert scene.run(GONE_SECONDS - 0.2, figure(0)) == [1, 2]
+    assert scene.run(0.5, figure(0)) == [1]
     assert scene.group.members[1].state is None
 
 
 def test_who_is_as_tall_comes_back(scene):
-    scene.run(1.0, column(0, 1.8), column(2, 1.5))
+    scene.run(1.0, figure(0, 1.8), figure(2, 1.5))
     scene.run(2.0)
-    assert scene.run(1.0, column(-1, 1.52)) == [2]
-    assert scene.run(1.0, column(-1, 1.52), column(3, 1.2)) == [2, 3]
+    assert scene.run(1.0, figure(-1, 1.52)) == [2]
+    assert scene.run(1.0, figure(-1, 1.52), figure(3, 1.2)) == [2, 3]
 
 
-def test_somebody_who_cannot_be_measured_is_no_person(scene):
+def test_a_person_who_cannot_be_measured_is_no_person(scene):
     scene.refuse = True
-    assert scene.run(2.0, column(0)) == []
+    assert scene.run(2.0, figure(0)) == []
     scene.refuse = False
-    assert scene.run(1.0, column(0)) == [1]
+    assert scene.run(1.0, figure(0)) == [1]
 
 
 def test_first_people_are_those_who_last(monkeypatch):
-    sets = [[column(0), column(2)], [column(0.05)], [column(0.1), column(2.1)], [column(0.1), column(2.1), column(5)]]
-    monkeypatch.setattr(module, "find_people", lambda room, masks: sets[masks[0]])
+    sets = [[figure(0), figure(2)], [figure(0.05)], [figure(0.1), figure(2.1)], [figure(0.1), figure(2.1), figure(5)]]
+    monkeypatch.setattr(module, "find_people", lambda floor, masks: sets[masks[0]])
     people, every = first_people(None, [0.0, 0.1, 0.2, 0.3], [[n] for n in range(4)])
     assert [len(each.sets) for each in people] == [4, 3]
-    assert [len(columns) for columns in every] == [2, 1, 2, 3]
+    assert [len(figures) for figures in every] == [2, 1, 2, 3]
+
+
+def test_cameras_are_judged_only_while_everybody_is_tracked(scene):
+    scene.run(1.0, figure(0))
+    assert scene.group.is_clear
+    scene.run(0.3, figure(0), figure(2))
+    assert not scene.group.is_clear
+    scene.run(1.0, figure(0), figure(2))
+    assert scene.group.is_clear
+    scene.run(0.2, figure(0))
+    assert not scene.group.is_clear
+
+
+@pytest.mark.parametrize(("facing", "fits", "turns"), [(-1.0, True, 1), (-1.0, False, 0), (1.0, True, 0)])
+def test_who_is_carried_backwards_is_turned_round_if_that_fits(scene, monkeypatch, facing, fits, turns):
+    scene.facing, turned = np.array([facing, 0.0]), []
+
+    def turn(tracker, rng, share):
+        if fits:
+            turned.append(share)
+            scene.facing = -scene.facing
+        return share.state if fits else None
+
+    monkeypatch.setattr(module, "turn_round", turn)
+    scene.run(1.0, figure(0))
+    for n in range(20):
+        scene.run(STEP, figure(0.1 * n))
+    assert scene.group.present
+    assert len(turned) == turns
+
+
+@pytest.mark.parametrize(("sided", "measured", "known"), [(True, True, True), (False, True, False), (True, False, False)])
+def test_where_a_person_faces_is_known_from_silhouettes_or_when_they_walk(scene, sided, measured, known):
+    scene.sided, scene.measured = sided, measured
+    scene.run(1.0, figure(0))
+    (member,) = scene.group.members
+    assert member.is_sided == known
+    for n in range(20):
+        scene.run(STEP, figure(0.1 * n))
+    assert member.is_sided

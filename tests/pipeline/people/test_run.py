@@ -12,12 +12,14 @@ from solids import Ellipsoid, ring, seen_by
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.io.people import person_folders, read_places
 from shadowpuppet.io.run import read_run
+from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.people.census import people_in, sampled_sets, take_census
 from shadowpuppet.pipeline.people.fitting import views_of
-from shadowpuppet.pipeline.people.run import check_people, matched_truths
+from shadowpuppet.pipeline.people.group import first_people
+from shadowpuppet.pipeline.people.run import PeopleRun, check_people, matched_truths
 from shadowpuppet.pipeline.track import track_recording
-from shadowpuppet.tracking.people.columns import find_people
+from shadowpuppet.tracking.people.figures import find_people
 
 FRAMES = 6
 
@@ -83,13 +85,12 @@ def test_sizes_are_measured_where_people_are_apart(seen):
     assert census is not None
     assert census.number == 2
     assert census.numbers == (2,) * FRAMES
-    one, other = find_people(census.room, masks[0])
-    views = views_of(census.room, one, [other], masks[0])
+    one, other = find_people(census.floor, masks[0])
+    views = views_of(census.floor, one, [other], masks[0])
     shown = [view for view in views if view is not None]
     assert len(shown) >= 2
     for view, mask in zip(views, masks[0]):
         assert view is None or 0 < np.count_nonzero(view) < 0.8 * np.count_nonzero(mask)
-    assert all(view is not None for view in views_of(census.room, one, [other], masks[0], strict=False))
 
 
 def test_a_census_of_nothing():
@@ -97,20 +98,23 @@ def test_a_census_of_nothing():
     assert sampled_sets([], []) == []
 
 
-def test_a_picture_that_is_all_silhouette_shows_nobody(monkeypatch):
+def test_a_picture_that_is_all_silhouette_shows_nobody():
     made = cameras()
     alone = [seen_by(camera, standing(0.9, -0.2)) for camera in made]
-    used: list[list[bool]] = []
-
-    def spy(room, masks):
-        used.append([mask is not None for mask in masks])
-        return find_people(room, masks)
-
-    monkeypatch.setattr("shadowpuppet.pipeline.people.census.find_people", spy)
-    census = take_census(made, [[np.ones_like(alone[0]), np.zeros_like(alone[0]), *alone[2:]]])
+    full = [np.ones_like(alone[0]), *alone[1:]]
+    census = take_census(made, [full] * 3)
     assert census is not None
-    census.people([*alone[:3], np.ones_like(alone[0])])
-    assert used == [[False, True, True, True], [True, True, True, False]]
+    assert census.numbers == (1, 1, 1)
+    assert [len(figures) for figures in first_people(census.floor, [0.0, 0.1, 0.2], [full] * 3)[1]] == [1, 1, 1]
+
+
+def test_who_comes_later_is_counted(seen):
+    made, masks = seen
+    alone = [[seen_by(camera, people(n)[0]) for camera in made] for n in range(FRAMES)]
+    census = take_census(made, alone, masks)
+    assert census is not None
+    assert census.number == 2
+    assert census.numbers == (1,) * FRAMES + (2,) * FRAMES
 
 
 def test_parts_of_a_picture_that_may_be_people():
@@ -133,3 +137,9 @@ def test_what_several_people_cannot_have():
 def test_no_truth_is_nobodys(run):
     motions = {number: read_run(folder).motion for number, folder in person_folders(run.folder).items()}
     assert matched_truths(motions, []) == {}
+
+
+def test_nothing_of_a_person_who_may_face_the_other_way_is_vouched_for():
+    frame = PeopleRun._doubted(MotionFrame(0.0, "tracked", limb_status=["tracked", "predicted", "lost"]))
+    assert (frame.status, frame.limb_status) == ("uncertain", ["uncertain", "predicted", "lost"])
+    assert PeopleRun._doubted(MotionFrame(0.0, "lost")).status == "lost"

@@ -13,8 +13,9 @@ import pytest
 from shadowpuppet.calibration.silhouettes import silhouettes_of
 from shadowpuppet.geometry import inverse, rigid, rotation_from_vector
 from shadowpuppet.io.calibration.calibration_files import read_calibration, write_calibration
-from shadowpuppet.pipeline.check_calibration import SilhouetteSets, judge_calibration
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.repair.check import SilhouetteSets, judge_calibration
+from shadowpuppet.pipeline.repair.films import Checked
 from shadowpuppet.pipeline.repair.fix import _write_notes, fix_recording
 from shadowpuppet.pipeline.rig import open_rig
 
@@ -38,7 +39,7 @@ def test_a_late_film_and_a_turned_camera_are_mended(copy, cameras, masks):
     wrong = [replace(camera, T_camera_world=turn @ camera.T_camera_world) if n == 2 else camera for n, camera in enumerate(cameras)]
     write_calibration(copy / "calibration.toml", wrong)
     rig, sets = open_rig(copy, Options(masks=True)), sets_of(masks, (0, 4, 0, 0))
-    fix = fix_recording(rig, sets, judge_calibration(rig, sets))
+    fix = fix_recording(rig, Checked(judge_calibration(rig, sets), sets, sets))
     assert len(fix.done) == 2
     start = tomllib.loads((copy / "recording.toml").read_text())["start"]
     assert start == {cameras[1].name: pytest.approx(4 / rig.rate, abs=0.3 / rig.rate)}
@@ -58,7 +59,7 @@ def test_nothing_is_changed_in_a_good_recording_or_of_a_still_person(copy, masks
     before = (copy / "calibration.toml").read_bytes()
     for sets in (sets_of(masks), SilhouetteSets([silhouettes_of(masks[20])] * 50, 1)):
         found = judge_calibration(rig, sets)
-        assert fix_recording(rig, sets, found).done == ()
+        assert fix_recording(rig, Checked(found, sets, sets)).done == ()
     assert found.still
     assert (copy / "calibration.toml").read_bytes() == before
     assert not (copy / "calibration.before1.toml").exists()

@@ -420,7 +420,7 @@ def test_acts_do_what_they_are_called():
     ({"motion": "walks"}, "motion.0.motion: input should be 'stand'"),
     ({"motion": "walk", "pace": 1.0}, "motion.0.pace: no such setting; possible are file, file_rate, motion, path, seconds, size"),
 ])  # fmt: skip
-def test_impossible_motions_are_told(values, words):
+def test_impossible_motions_are_reported(values, words):
     with pytest.raises(SettingsError, match=words):
         spec_from({"motion": [values]})
 
@@ -468,7 +468,7 @@ def test_children_have_childrens_proportions():
     ("woman", {"stature": 2.6}, "stature: found 2.6, expected 0.9 to 2.2"),
     ("man", {"bmi": 80}, "bmi: found 80, expected 1[0-9].* to 5"),
 ])  # fmt: skip
-def test_impossible_people_are_told(kind, wishes, words):
+def test_impossible_people_are_reported(kind, wishes, words):
     with pytest.raises(SettingsError, match=words):
         Mannequin.draw(np.random.default_rng(1), kind, **wishes)
 

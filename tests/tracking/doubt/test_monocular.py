@@ -8,7 +8,9 @@ import numpy as np
 import people
 import pytest
 
-from shadowpuppet.tracking.doubt.mirror import Mirrors, _weights
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.camera.rasterize import Picture
+from shadowpuppet.tracking.doubt.mirror import TOGETHER_ALLOWED, Mirrors, _weights
 from shadowpuppet.tracking.doubt.monocular import Chains, MonocularDoubt
 from shadowpuppet.tracking.doubt.variance import variance_model
 from shadowpuppet.tracking.monocular.settings import make_settings
@@ -129,6 +131,35 @@ def test_an_arm_that_points_to_the_camera_may_point_away_from_it():
 def test_an_arm_in_the_plane_of_the_picture_has_no_other_place():
     flat = pose(left_shoulder_abduction=1.57, right_shoulder_abduction=1.57)
     assert all(mode.weight < 0.5 for mode in doubt(flat)[0].modes)
+
+
+def test_arms_held_out_from_a_twisted_trunk_may_be_as_far_before_as_behind():
+    """One straight line from hand to hand looks the same turned to the left and to the right."""
+    twisted = pose(torso_twist=0.4, left_shoulder_abduction=1.5, right_shoulder_abduction=1.5)
+    picture = people.picture()
+    points, mask = picture.points(twisted[None])[0], picture.mask(twisted)
+    seen = MIRRORS.together(twisted, points, Observation.of(mask))
+    assert seen.points.shape == (1, 2, len(NAMES), 3)
+    moved = (seen.points[0, seen.more[0].argmin()] - points)[[LEFT_HAND, RIGHT_HAND]]
+    assert np.sign(moved[:, 2]).tolist() == np.sign(points[[RIGHT_HAND, LEFT_HAND], 2] - points[[LEFT_HAND, RIGHT_HAND], 2]).tolist()
+    assert (np.abs(moved[:, 2]) > 0.15).all()
+    assert (np.abs(moved[:, :2]) < 0.15).all()
+    assert seen.more.min() < 0.3 * mask.sum()
+    far = seen.displacements(points, TOGETHER_ALLOWED)
+    assert far[LEFT_HAND, 2] > 0.3 > far[LEFT_HAND, :2].max()
+    assert far[NAMES.index("pelvis")].max() < 0.05
+    found = dict(MonocularDoubt(tracker()).evidence(state(twisted, mask), mask, 0.0, None)[0].components)
+    with_it, without = (variance_model("monocular").sd(NAMES, {**found, "together": each}) for each in (far, 0 * far))
+    assert with_it[LEFT_HAND, 2] > 1.1 * without[LEFT_HAND, 2]
+
+
+def test_a_body_whose_trunk_does_not_twist_has_no_images_of_trunk_and_arms():
+    whole = Picture(make_body("anatomical", average_sizes("anatomical", 1.75)), people.camera(), people.picture().T_camera_base)
+    at = np.zeros(len(whole.body.skeleton.dofs))
+    points = whole.points(at[None])[0]
+    seen = Mirrors(whole).together(at, points, Observation.of(whole.mask(at)))
+    assert seen.points.shape == (0, 2, *points.shape)
+    assert not seen.displacements(points).any()
 
 
 def test_images_that_differ_from_no_other_place_are_no_modes_and_cheaper_ones_weigh_more():

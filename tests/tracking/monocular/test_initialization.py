@@ -134,7 +134,7 @@ def test_without_either_the_average_is_taken():
 
 
 def test_each_search_ends_with_its_least_cost_and_keeps_it(monkeypatch):
-    """From one search to the next the cost may rise: where the legs are, is looked up anew."""
+    """From one search to the next the cost may rise: where the legs are, is looked up again."""
     original, searches = SizeSearch.search, []
 
     def search(of, rng, columns, pictures, settings, sigma, scale=True):
@@ -227,7 +227,7 @@ def test_same_seed_same_sizes():
     ("front_arms_t_pose", {"left_shoulder_abduction": 0.3, "right_shoulder_abduction": 1.57}),
     ("side_arms_hanging", {"left_shoulder_abduction": 1.57, "right_shoulder_abduction": 1.57}),
 ])  # fmt: skip
-def test_a_wrong_posture_can_be_told(name, shown):
+def test_a_wrong_posture_can_be_reported(name, shown):
     """Sizes can hide a wrong posture (arms that hang are no arms): overlap alone does not tell it, `wrong_posture` does."""
     pose = BODIES["rounded"](SOMEONE).skeleton.pose(**shown)
     wrong = references() | {name: seen(pose)}

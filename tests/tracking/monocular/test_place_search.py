@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from people import BODIES, camera
 
 from shadowpuppet.body.anthropometry import sizes_from_height
-from shadowpuppet.tracking.monocular.place_search import CLOTHED, RATIO, _peak, find_place
+from shadowpuppet.tracking.monocular.place_search import CLOTHED, PLATEAU, RATIO, _middle, find_place
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 
 CAMERA = camera((160, 120))
@@ -67,19 +65,18 @@ def test_given_distances_are_kept():
     assert find_place(CAMERA, [seen(ARMS[0])], 1.75, 2.5, None)[0].distance == 2.5
 
 
-@given(st.floats(1.0, 5.0), st.floats(-0.5, 0.5), st.floats(0.1, 10.0))
-@settings(max_examples=30, deadline=None)
-def test_the_peak_of_a_parabola_is_found_between_the_tried_distances(middle, off, bend):
-    steps = np.arange(-3, 4)
-    peak = middle * RATIO**off
-    assert _peak(middle * RATIO**steps, -bend * (steps - off) ** 2) == pytest.approx(peak, rel=1e-6)
+@pytest.mark.parametrize(("below", "above"), [(3.2, 3.2), (2.4, 5.7)])
+def test_the_middle_of_a_plateau_is_between_where_the_overlap_falls_below_it(below, above):
+    steps = np.arange(-8.0, 9.0)
+    overlaps = 0.9 - np.where(steps < 0, -steps / below, steps / above) * PLATEAU
+    assert _middle(2 * RATIO**steps, overlaps) == pytest.approx(2 * RATIO ** ((above - below) / 2), rel=1e-6)
 
 
-@pytest.mark.parametrize("overlaps", [[3, 2, 1], [1, 2, 3], [1.0, 1.0, 1.0]])
-def test_a_peak_at_the_end_is_the_end(overlaps):
-    tried = 2.0 * RATIO ** np.arange(3)
-    assert _peak(tried, np.array(overlaps, float)) == tried[int(np.argmax(overlaps))]
+def test_a_plateau_that_does_not_end_reaches_to_the_last_distance():
+    assert _middle(np.array([1.0, 1.1, 1.21]), np.array([0.9, 0.9, 0.89])) == pytest.approx(1.1)
+    assert _middle(np.array([2.0]), np.array([0.9])) == pytest.approx(2.0)
 
 
-def test_a_peak_beside_a_gap_is_a_tried_distance():
-    assert _peak(np.array([1.0, 2.0, 2.1]), np.array([0.1, 0.9, 0.8])) == 2.0
+def test_other_heights_at_a_distance_do_not_count():
+    tried = np.array([1.0, 1.0, 1.1, 1.1, 1.21, 1.21])
+    assert _middle(tried, np.array([0.7, 0.3, 0.9, 0.2, 0.7, 0.4])) == pytest.approx(1.1)

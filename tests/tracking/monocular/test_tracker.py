@@ -365,3 +365,16 @@ def test_in_a_film_blurred_by_motion_what_is_covered_since_this_frame_does_not_c
     assert observation.area == int((blurred[-1] & blurred[-2]).sum())
     drawn = view().draw(poses[-1])
     assert observation.cost_and_overlap(drawn)[0] <= plain.observe(blurred[-1], state.pose).cost_and_overlap(drawn)[0]
+
+
+@pytest.mark.parametrize(("degrees", "follows"), [(14, True), (0, False)])
+def test_a_quick_turn_is_followed_to_the_profile(degrees, follows):
+    """14 degrees a frame are 210 degrees/s at 15 frames/s: more than the noise of a frame reaches."""
+    twists = np.radians(np.minimum(degrees * np.arange(8), 85))
+    poses = [view("rounded").body.skeleton.pose(torso_twist=twist, left_shoulder_abduction=0.1, right_shoulder_abduction=0.1)
+             for twist in twists]
+    turned = MonocularTracker(view("rounded"), make_settings("default"))
+    states = track(turned, [view("rounded").mask(pose) for pose in poses])
+    found = abs(states[-1].pose[view("rounded").body.skeleton.dof_names.index("torso_twist")])
+    assert (found > np.radians(60)) == follows
+    assert any(turned.is_narrow(view("rounded").mask(now), before.pose) for before, now in zip(states, poses[1:])) == follows

@@ -159,7 +159,7 @@ def test_legs_that_a_stage_names_have_no_stage_more():
 
 
 @pytest.mark.parametrize("sizes", [None, average_sizes("cylinders", HEIGHT)], ids=["unknown", "given"])
-def test_somebody_is_found_by_silhouettes_alone(sizes):
+def test_a_person_is_found_by_silhouettes_alone(sizes):
     view = picture("cylinders")
     poses = [view.body.skeleton.pose(**{dof: share * value for dof, value in ARMS["cylinders"].items()}) for share in (0.6, 1.0, 1.3)]
     quick, height = replace(InitializationSettings(), rounds=15, patience=5, sweeps=1), None if sizes else HEIGHT

@@ -47,7 +47,7 @@ def found_in(pose, rng, number: int = 4, name: str = "anatomical", library=None)
 
 
 @pytest.mark.parametrize("heading", [0.1, 1.3, 3.1, -2.0])
-def test_somebody_is_found_whichever_way_they_face(heading, rng):
+def test_a_person_is_found_whichever_way_they_face(heading, rng):
     pose = actor.stance(actor.body().skeleton, 0.35, heading, (0.4, -0.3))
     of, found = found_in(pose, rng)
     assert actor.apart(of, found.best, pose)[0] < 0.03

@@ -94,7 +94,7 @@ def test_nobody_is_said():
         measured(size_deviations(MEAN, shown=True), [(actor.hull().points(nobody), nobody)] * 3)
 
 
-def test_somebody_in_a_few_frames_only_is_taken_as_expected():
+def test_a_person_in_a_few_frames_only_is_taken_as_expected():
     """Of too few frames nothing is solved for; those without anybody do no harm."""
     first = stout()[2]
     nobody = [np.zeros_like(mask) for mask in first[0][1]]

@@ -281,7 +281,7 @@ def test_who_comes_back_elsewhere_or_jumps_is_found():
 
 def test_as_in_the_paper_nobody_is_searched_for_again(monkeypatch):
     _, seen = actor.filmed()
-    _, later = actor.filmed(begin=2.5, frames=3)
+    _, later = actor.filmed(begin=4.0, frames=3)
     of = tracker(recover=False)
     state, rng = track(of, seen[:3])[-1], np.random.default_rng(0)
     monkeypatch.setattr(type(of), "search", lambda *_: pytest.fail("searched for"))

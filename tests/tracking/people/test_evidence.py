@@ -88,9 +88,9 @@ def test_who_touches(apart, numbers):
 def test_what_is_explained():
     assert explained({}, 1) == []
     (found,) = explained({1: drawn(0, 12), 2: drawn(40, 52)}, 1)
-    assert found.shape == (15, 20)
-    assert found[3:12, 0:3].all()
-    assert not found[:, 6:8].any()
+    assert found.shape == (30, 40)
+    assert found[6:24, 0:6].all()
+    assert not found[:, 12:15].any()
 
 
 def test_views_that_hide_a_person_do_not_count_in_the_overlap():

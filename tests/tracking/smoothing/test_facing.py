@@ -125,6 +125,27 @@ def test_a_profile_is_turned_to_the_side_of_the_head(lean, turned):
     assert np.abs(np.diff(found.poses[:, TWIST])).max() < 0.6
 
 
+def test_a_profile_too_brief_counts_only_if_the_head_shows_it():
+    _, poses = half_turn()
+    angles = np.abs(poses[:, TWIST])
+    brief = angles.argmax() + np.arange(-2, 3)
+    poses[:, TWIST] = np.where(angles > np.radians(50), np.radians(-40), poses[:, TWIST])
+    poses[brief, TWIST] = np.radians(-75)
+    motion, leans = motion_of(NAME, poses), np.full(len(poses), np.nan)
+    assert turns(motion) == []
+    leans[brief] = -0.1
+    assert len(turns(motion, leans)) == 1
+
+
+def test_a_head_that_leans_wrongly_in_few_frames_turns_nobody():
+    _, poses = half_turn()
+    profile = np.flatnonzero(np.abs(poses[:, TWIST]) > np.radians(50))
+    leans = np.full(len(poses), np.nan)
+    leans[profile] = -0.08
+    leans[profile[: len(profile) // 3]] = 0.4
+    assert not turned_on(motion_of(NAME, poses), leans=leans).reversed.any()
+
+
 def test_few_leans_are_not_enough():
     _, poses = half_turn()
     leans = np.full(len(poses), np.nan)

@@ -67,7 +67,7 @@ def test_frames_without_a_pose_pass_in_their_place(lost, rng):
     assert all(np.isfinite(np.asarray(frame.pose)).all() == (frame.status != "lost") for frame in frames)
 
 
-def test_after_a_pause_the_motion_begins_anew(rng):
+def test_after_a_pause_the_motion_begins_again(rng):
     _, raw = tracked("rounded", rng, 40, range(5, 30))
     out, rest = given(raw, "rounded", 0.1)
     after = [frame for frame in (*(frame for each in out for frame in each), *rest) if frame.time > 29.5 / RATE]

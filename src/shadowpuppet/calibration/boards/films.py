@@ -15,12 +15,10 @@ from shadowpuppet.calibration.boards.detection import BoardDetector, View
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.threads import usable_cores
-from shadowpuppet.video.film import opened
+from shadowpuppet.video.film import FILM_SUFFIXES, opened
 from shadowpuppet.video.images import IMAGE_SUFFIXES, read_image
 from shadowpuppet.video.seeking import Seeker
 
-FILM_SUFFIXES = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".mpg", ".mpeg", ".webm", ".mts")
-"""Endings of films."""
 SAMPLES = 120
 """Number of times at which a film is looked at, evenly spread."""
 LEAST_STEP = 0.2

@@ -98,6 +98,6 @@ def _rows(found: Calibrated) -> Iterator[tuple[str, ...]]:
     for n, (camera, fit) in enumerate(zip(found.cameras, found.lenses)):
         lens = ("given", "", "", "") if fit is None else (fit.model, str(fit.views), f"{fit.rms:.2f} px", f"{fit.held_out:.2f} px")
         doubt = "" if fit is None else f" ± {100 * fit.focal_sd:.1f} %"
-        place = " ".join(f"{value + 0.0:.2f}" for value in np.round(camera.centre, 2)) if found.placement is not None else "not told"
+        place = " ".join(f"{value + 0.0:.2f}" for value in np.round(camera.centre, 2)) if found.placement is not None else "not known"
         sure = "" if found.placement is None else f"{1000 * 3 * found.placement.solved.place_sd[n]:.1f} mm"
         yield (camera.name, *lens, f"{camera.matrix[0, 0]:.1f}{doubt}", place, sure)

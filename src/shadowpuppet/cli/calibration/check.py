@@ -15,7 +15,7 @@ from shadowpuppet.cli.tables import pairs, show, show_json, table
 from shadowpuppet.errors import RecordingError
 
 if TYPE_CHECKING:
-    from shadowpuppet.pipeline.check_calibration import CalibrationCheck
+    from shadowpuppet.pipeline.repair.check import CalibrationCheck
     from shadowpuppet.pipeline.repair.fix import Fix
 
 
@@ -31,7 +31,7 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
         kept beside them. Shows the disagreement in pixels before and after.
     """
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.pipeline.check_calibration import check_sets
+    from shadowpuppet.pipeline.repair.films import check_films
     from shadowpuppet.pipeline.repair.fix import fix_recording
     from shadowpuppet.pipeline.rig import open_rig
 
@@ -40,8 +40,9 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
     options = options_from(flags, config)
     with terminal(quiet=as_json) as listener:
         rig = open_rig(recording, options)
-        found, sets = check_sets(rig, options, listener)
-        mended = fix_recording(rig, sets, found) if fix else None
+        checked = check_films(rig, options, listener)
+        found = checked.check
+        mended = fix_recording(rig, checked) if fix else None
     if as_json:
         show_json(found if mended is None else {"check": found, "fix": mended})
     else:
@@ -57,10 +58,20 @@ def check_table(check: CalibrationCheck) -> RenderableType:
         ("compared", f"{check.sets} sets of silhouettes, {check.rate:.4g} a second, of {check.frame_rate:.4g} frames/s"),
         ("limit", f"{found.limit:.1f} px; cameras that fit are apart by about one"),
         ("height", None if found.height is None else f"{found.height:.2f} m from end to end, as the cameras see it"),
-        ("time", "cannot tell: nobody moves enough" if check.still else None),
+        ("time", "by the films' sound" if check.by_sound else "cannot tell: nobody moves enough" if check.still else None),
+        ("sound", _heard(check)),
     ]
     verdict = "all cameras agree" if check.good else "\n".join(check.doubts)
     return Group(pairs(rows), "", table("", columns, _agreement_rows(check), right=(1, 3, 4)), "", pairs([("verdict", verdict)]))
+
+
+def _heard(check: CalibrationCheck) -> str | None:
+    """Offsets by sound, in frames."""
+    if check.sound is None:
+        return None
+    heard = [f"{name} {seconds * check.frame_rate:+.1f}" for name, seconds in zip(check.sound.names, check.sound.seconds)
+             if seconds is not None]
+    return f"late by {', '.join(heard)} frames" if heard else "the films share no sound that stands out"
 
 
 def _agreement_rows(check: CalibrationCheck) -> Iterator[tuple[Any, ...]]:

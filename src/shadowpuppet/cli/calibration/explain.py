@@ -26,11 +26,11 @@ LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 
 def is_explained(path: Path) -> bool:
     """Whether `path` is a calibration, not a recording."""
-    from shadowpuppet.io.calibration.calibration_files import find_calibration, is_calibration
+    from shadowpuppet.io.calibration.formats import find_calibration, is_calibration
+    from shadowpuppet.io.recording import is_recording
 
     if path.is_dir():
-        made = any((path / name).exists() for name in ("video", "recording.toml"))
-        return not made and (is_calibration(path) or find_calibration(path) is not None)
+        return not is_recording(path) and (is_calibration(path) or find_calibration(path) is not None)
     return path.is_file() and is_calibration(path)
 
 
@@ -38,7 +38,8 @@ def explain(path: Path, to: Path | None, unit: str | None, up: str | None, as_js
     """Explain a calibration, and write it to `to`."""
     from shadowpuppet.calibration.overview import look_at_calibration
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.io.calibration.calibration_files import find_calibration, is_calibration, write_calibration
+    from shadowpuppet.io.calibration.calibration_files import write_calibration
+    from shadowpuppet.io.calibration.formats import find_calibration, is_calibration
 
     with terminal(quiet=as_json) as listener:
         path = path if is_calibration(path) else find_calibration(path) or path
@@ -63,7 +64,8 @@ def refuse_for_recordings(path: Path, to: Path | None, unit: str | None, up: str
 
 def refuse_other_files(path: Path) -> None:
     """Raise `ShadowPuppetError`, saying what it is, for a file that is no film but a calibration, settings or motion that is not read."""
-    from shadowpuppet.io.calibration.calibration_files import ENDINGS, NO_CALIBRATIONS, examine_calibration
+    from shadowpuppet.io.calibration.calibration_files import examine_calibration
+    from shadowpuppet.io.calibration.formats import ENDINGS, NO_CALIBRATIONS
     from shadowpuppet.io.motion import READABLE
 
     ending = path.suffix.lower()
@@ -104,7 +106,7 @@ def _facts(look: CalibrationLook) -> Iterator[tuple[str, str]]:
 
 def _camera_rows(look: CalibrationLook) -> Iterator[tuple[str, ...]]:
     for n, camera in enumerate(look.cameras):
-        place = " ".join(f"{value:.2f}" for value in camera.place) if camera.placed else "not told"
+        place = " ".join(f"{value:.2f}" for value in camera.place) if camera.placed else "not known"
         bend = "not at all" if not camera.bend else f"{camera.bend:.0f} px" if abs(camera.bend) < float("inf") else "beyond telling"
         yield (_letter(n), camera.name, f"{camera.size[0]}x{camera.size[1]}", f"{camera.fov[0]:.0f}°", place, _looks(camera),
                f"{round(camera.roll)}°", "" if camera.away is None else f"{camera.away:.2f} m",
@@ -147,5 +149,5 @@ def _legend(look: CalibrationLook) -> Iterator[tuple[str, str]]:
     whole = sum(count == most for row in look.seen for count in row) * cell
     yield "from above", (f"{x1 - x0:.1f} m to a side, x to the right from {x0:.1f} to {x1:.1f}, y up from {y0:.1f} to {y1:.1f}; "
                          "letters are cameras with arrows the way they look, × the place they look at")
-    yield "figures", (f"how many cameras see somebody of 1.80 m whole who stands there: {most} over {whole:.1f} m²" if most
-                      else "no camera sees somebody of 1.80 m whole anywhere here, if Z = 0 is the floor")
+    yield "figures", (f"how many cameras see a person of 1.80 m whole who stands there: {most} over {whole:.1f} m²" if most
+                      else "no camera sees a person of 1.80 m whole anywhere here, if Z = 0 is the floor")

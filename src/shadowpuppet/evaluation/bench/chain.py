@@ -101,7 +101,7 @@ def start_times() -> tuple[float, float]:
 
 def _start(cache: str) -> float:
     begin = time.perf_counter()
-    _child("the process that starts anew failed", {"NUMBA_CACHE_DIR": cache}, "start")
+    _child("the process that starts again failed", {"NUMBA_CACHE_DIR": cache}, "start")
     return time.perf_counter() - begin
 
 

@@ -43,7 +43,7 @@ def run_mono(quick: bool, listener: Listener) -> tuple[dict[str, Any], dict[str,
     listener.begin("a long film")
     out |= chain_figures("mono", measure_chain(WAVING, QUICK_FRAMES if quick else FRAMES), "one_core")
     if not quick:
-        listener.begin("compiling anew")
+        listener.begin("compiling again")
         out["mono.compile_s"], out["mono.start_s"] = start_times()
     return out, raw
 

@@ -165,6 +165,6 @@ def _intervals(of: Evaluation) -> str:
     cells = ((name.replace("_", " "), *(f"{100 * row[f'within_{level}']:.0f}" for level in LEVELS), f"{row['rms_z']:.2f}",
               f"{row['sd_mean_mm']:.1f}") for name, row in coverage["joints"].items())  # fmt: skip
     by_joint = table(["joint", *(f"{level} %" for level in LEVELS), "rms z", "mean sd, mm"], rows(cells))
-    note = "Share of the truth within the run's intervals of so many percent; on the line they are honest, below it too narrow."
+    note = "Share of the truth within the run's intervals of a stated percentage; below the line they are too narrow."
     return f'{text}<div class="pair">{figure(charts.coverage_chart(coverage, list(LEVELS)), note)}<div>{by_joint}</div></div>'
 

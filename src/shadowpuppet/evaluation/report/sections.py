@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.evaluation.report.html import definitions, plain, rows, table
-from shadowpuppet.evaluation.summary_text import WAYS, bones_text, clock_text, doubt_text, losses_text, root_text, world_text
+from shadowpuppet.evaluation.summary_text import WAYS, bones_text, clock_text, doubt_text, feet_text, losses_text, root_text, world_text
 from shadowpuppet.motion.metrics import FAR_ERROR, LOST_ERROR
 
 
@@ -156,6 +156,7 @@ def run_facts(of: Evaluation) -> str:
             ("Frames", ", ".join(f"{count} {status}" for status, count in measured["status"].items())),
             ("Doubt", doubt_text(measured)),
             ("No pose", losses_text(measured["losses"])),
+            ("Feet", feet_text(measured["feet"])),
             ("Clock", clock_text(measured["clock"]) if "clock" in measured else None),
             ("World", world_text(measured["world"]) if measured.get("world") else None),
             ("Made with", ", ".join(f"{name} {version}" for name, version in info.get("versions", {}).items()))]

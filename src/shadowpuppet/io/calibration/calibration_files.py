@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import CalibrationError, ShadowPuppetError, check_regular, choices, reason
+from shadowpuppet.errors import CalibrationError, ShadowPuppetError, reason
 from shadowpuppet.geometry import Array, inverse, rigid
-from shadowpuppet.io.calibration.bouguet import read_bouguet
-from shadowpuppet.io.calibration.colmap import is_colmap, read_colmap
-from shadowpuppet.io.calibration.draft import Draft, Drafts
-from shadowpuppet.io.calibration.json_cameras import mentions_cameras, read_json
-from shadowpuppet.io.calibration.opencv import SUFFIXES, easymocap_texts, files_of, pair_of, read_opencv
-from shadowpuppet.io.calibration.pose2sim import check_name, read_tables, tables_text
-from shadowpuppet.io.calibration.qualisys import read_qualisys
-from shadowpuppet.io.calibration.vicon import read_vicon
+from shadowpuppet.io.calibration.draft import Draft
+from shadowpuppet.io.calibration.formats import format_of
+from shadowpuppet.io.calibration.opencv import SUFFIXES, easymocap_texts
+from shadowpuppet.io.calibration.pose2sim import check_name, tables_text
 from shadowpuppet.io.files.text import write_whole
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -36,18 +30,6 @@ SIZE_TOLERANCE = 0.08
 """Largest relative difference to one of `SIZES`."""
 MIN_SPREAD, MIN_AGREEMENT = 0.02, 0.8
 """For `_level`: least second eigenvalue of the directions of rows, and cosine between their normal and the mean up direction."""
-HEAD_BYTES = 4096
-"""Number of bytes from which a format is recognised."""
-
-
-class Format(NamedTuple):
-    """A format of calibration files."""
-
-    name: str
-    """Name in messages."""
-    fits: Callable[[Path, str], bool]
-    """Whether a file has this format, given its path and the beginning of its text."""
-    read: Callable[[Path], Drafts]
 
 
 @dataclass(frozen=True)
@@ -66,34 +48,13 @@ class Calibration:
     """Remarks for the user, a sentence each."""
 
 
-def _ends(path: Path, *endings: str) -> bool:
-    return path.suffix.lower() in endings
-
-
-QUALISYS_TAGS = re.compile(r"<calibration[\s>].*<cameras?[\s>]", re.DOTALL)
-"""OpenCV's files have tags that begin so: `<calibration_time>`, `<camera_matrix>`."""
-QUALISYS = Format("Qualisys (.qca.txt)", lambda path, text: QUALISYS_TAGS.search(text) is not None, read_qualisys)
-VICON = Format("Vicon (.xcp)", lambda path, text: "<Cameras" in text or _ends(path, ".xcp"), read_vicon)
-EASYMOCAP = Format("EasyMocap (intri.yml, extri.yml)",
-                   lambda path, text: path.stem in ("intri", "extri") and _ends(path, *SUFFIXES), read_opencv)
-OPENCV = Format("OpenCV (YAML, XML)",
-                lambda path, text: _ends(path, *SUFFIXES) or "<opencv_storage" in text or "!!opencv-matrix" in text, read_opencv)
-HUMANEVA = Format("HumanEva (.cal)", lambda path, text: _ends(path, ".cal"), read_bouguet)
-TABLES = Format("TOML (Pose2Sim, Anipose, FreeMoCap, Caliscope)",
-                lambda path, text: _ends(path, ".toml") or all(f"\n{key}" in f"\n{text}" for key in ("matrix", "distortions")), read_tables)
-COLMAP = Format("COLMAP (cameras.txt, images.txt)", lambda path, text: is_colmap(path), read_colmap)
-JSON = Format("JSON", lambda path, text: _ends(path, ".json"), read_json)
-FORMATS = (JSON, COLMAP, QUALISYS, VICON, EASYMOCAP, OPENCV, HUMANEVA, TABLES)
-"""All formats, in the order in which they are tried."""
-
-
 def read_calibration(path: str | Path, *, unit: str | None = None, up: str | None = None,
                      sizes: Callable[[str], tuple[int, int] | None] | None = None) -> tuple[Camera, ...]:
     """Cameras of a calibration file or folder, in its order: metres, X_camera = R X_world + t, OpenCV's lens.
 
     Formats, recognised by content: JSON with K, R and t a camera, COLMAP's text, TOML of Pose2Sim, Anipose, FreeMoCap and Caliscope (its
-    own and its export), OpenCV's YAML and XML,
-    EasyMocap's pair, Qualisys' .qca.txt, Vicon's .xcp, HumanEva's .cal. Raises `CalibrationError` with the file, camera and field if
+    own and its export), OpenCV's YAML and XML, EasyMocap's pair, Kalibr's camera chain, KRT, BioCV's .calib, Qualisys' .qca.txt, Vicon's
+    .xcp, HumanEva's .cal. Raises `CalibrationError` with the file, camera and field if
     something is missing or impossible.
 
     Args:
@@ -128,47 +89,6 @@ def examine_calibration(path: str | Path, unit: str | None = None, up: str | Non
         cameras[camera.name] = camera
     upright = rotated_up(tuple(cameras.values()), up) if up else tuple(cameras.values())
     return Calibration(path, kind.name, upright, used, bool(unit or found.unit), tuple(notes))
-
-
-def format_of(path: Path) -> Format:
-    """The format of a file or folder. Raises `CalibrationError` if it is none of `FORMATS`."""
-    if path.is_dir():
-        if any(path.glob("*.cal")):
-            return HUMANEVA
-        if is_colmap(path):
-            return COLMAP
-        if not files_of(path):
-            raise CalibrationError(f"{path}: is a directory, and no calibration is in it that takes a whole one, expected a file, a folder "
-                                   "with EasyMocap's intri.yml and extri.yml, or one with a .cal or OpenCV file a camera")
-        return EASYMOCAP if any(file.stem in ("intri", "extri") for file in files_of(path)) else OPENCV
-    try:
-        check_regular(path)
-        with path.open("rb") as file:
-            head = file.read(HEAD_BYTES)
-    except OSError as error:
-        raise CalibrationError(f"{path}: cannot be read ({reason(error)})") from None
-    if path.suffix.lower() in (".pickle", ".pkl") or (head[:1] == b"\x80" and head[1:2] in b"\2\3\4\5"):
-        raise CalibrationError(f"{path}: is a pickle, as OpenCap saves calibrations: reading one runs any program that is in it, so it is "
-                               "not opened here; where you trust it, Pose2Sim makes TOML of it (calibration type convert, from opencap)")
-    text = head.decode("utf-8", "replace")
-    kind = next((kind for kind in FORMATS if kind.fits(path, text)), None)
-    if kind is None:
-        raise CalibrationError(f"{path}: found no calibration in it that is known, expected one of: {'; '.join(f.name for f in FORMATS)}")
-    return kind
-
-
-def is_calibration(path: Path) -> bool:
-    """Whether a file or folder is a calibration, by its beginning; reading it may still fail."""
-    try:
-        kind = format_of(path)
-    except CalibrationError:
-        return path.suffix.lower() in (".pickle", ".pkl")
-    if kind is JSON:
-        return mentions_cameras(path)
-    if path.is_file() and kind is TABLES:
-        with path.open("rb") as file:
-            return b"matrix" in file.read(HEAD_BYTES)
-    return True
 
 
 def _camera(draft: Draft, metres: float, sizes: Callable[[str], tuple[int, int] | None] | None, notes: list[str]) -> Camera:
@@ -264,38 +184,3 @@ def write_calibration(path: str | Path, cameras: Iterable[Camera]) -> None:
         raise CalibrationError(f"{path}: cannot be written ({reason(error)})") from None
     except ShadowPuppetError as error:
         raise CalibrationError(str(error)) from None
-
-
-def find_calibration(folder: Path) -> Path | None:
-    """The calibration in a recording folder, or in its folder `calibration`; None if there is none. calibration.toml is preferred.
-
-    Raises `CalibrationError` if there are several.
-    """
-    if (folder / "calibration.toml").exists():
-        return folder / "calibration.toml"
-    for place in (folder, folder / "calibration", folder / "Calibration"):
-        if not place.is_dir():
-            continue
-        files = [path for path in sorted(place.iterdir()) if path.is_file() and path.suffix.lower() in ENDINGS and path.name[0] != "."
-                 and path.name not in NO_CALIBRATIONS and is_calibration(path)]
-        whole = {place if _in_pieces(path, files) else path for path in files}
-        if len(whole) > 1:
-            raise CalibrationError(f"{place}: found several calibrations ({choices(path.name for path in files)}); say in recording.toml "
-                                   f"which counts, as calibration = \"{files[0].name}\"")
-        if whole:
-            return whole.pop()
-    return None
-
-
-ENDINGS = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".cal", ".pickle", ".pkl")
-"""Endings of files that may be calibrations."""
-NO_CALIBRATIONS = ("recording.toml", "spec.toml", "person.toml", "run.toml", "Config.toml")
-"""Names of files with such endings that are no calibrations."""
-
-
-def _in_pieces(path: Path, files: list[Path]) -> bool:
-    """Whether a file is only a part of its folder's calibration."""
-    if is_colmap(path):
-        return True
-    alike = [other for other in files if other.suffix == path.suffix]
-    return pair_of(path) is not None or (len(alike) > 1 and len(alike) == len(files) and path.suffix.lower() in (".cal", *SUFFIXES))

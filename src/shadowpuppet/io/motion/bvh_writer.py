@@ -61,7 +61,7 @@ def at_constant_rate(path: Path, animation: Animation) -> tuple[float, Animation
     except ShadowPuppetError as error:
         raise ShadowPuppetError(f"{path}: {error}") from None
     if grid.frames is None:
-        warn(f"{path}: the frames do not come at a constant rate, which this format needs; they were found anew at {grid.rate:g} frames/s",
+        warn(f"{path}: the frames do not come at a constant rate, which this format needs; they were resampled at {grid.rate:g} frames/s",
              ShadowPuppetWarning, stacklevel=3)  # fmt: skip
     unknown = int((~animation.known).sum()) + (0 if grid.frames is None else int((grid.frames < 0).sum()))
     if unknown:

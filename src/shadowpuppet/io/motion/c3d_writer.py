@@ -15,6 +15,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.c3d import BYTES, CHAR, FLOAT, INT, INTEL, KEY
+from shadowpuppet.motion.contact.contact import FootEvent
 from shadowpuppet.motion.interpolation import resample, uniform_sampling
 from shadowpuppet.motion.motion import JointTable
 
@@ -28,6 +29,8 @@ MAX_RESIDUAL = 255
 """Greatest residual, millimetres: a byte in the format's integer files."""
 UNKNOWN_RESIDUAL = -1.0
 """Marks an unknown position."""
+EVENTS = {True: "Foot Strike", False: "Foot Off"}
+"""What happens to a foot, in the words of Vicon's programs."""
 Parameter = tuple[str, int, Sequence[int], bytes]
 """Name, kind, shape and value."""
 Angles = Mapping[str, tuple[str, Array]]
@@ -35,7 +38,7 @@ Angles = Mapping[str, tuple[str, Array]]
 
 
 def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, angles: Angles | None = None,
-              smoothing: str = "") -> None:
+              smoothing: str = "", events: Sequence[FootEvent] = ()) -> None:
     """Write joints as points in millimetres, without changing axes, and `angles` as analog channels, one value per frame.
 
     The file has a constant rate: missing frames become unknown; frames at a varying rate are resampled, with a warning. The first time is
@@ -48,6 +51,7 @@ def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, 
         spread: standard deviations (T, J), metres, written as residuals in whole millimetres; 0 for None or NaN.
         angles: unit and values (T,) of each angle; NaN if unknown.
         smoothing: how the motion was smoothed, written as PROCESSING:SMOOTHING; empty if unknown.
+        events: strikes and offs of the feet, written as the group EVENT, as Vicon's programs do; at most 255.
     """
     path, angles = Path(path), angles or {}
     bad = [name for name in (*table.names, *angles) if not 0 < len(name.encode()) <= MAX_LETTERS]
@@ -64,7 +68,8 @@ def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, 
     data = np.concatenate([_points(places.reshape(count, points, 3), deviations).reshape(count, -1), analog], 1).astype("<f4")
     blocks, section = 0, b""
     while True:  # the parameters state where the data begins, which depends on their length
-        section = _section(_groups(table.names, angles, rate, (first, count), 2 + blocks, smoothing), blocks)
+        section = _section(_groups(table.names, angles, rate, (first, count), 2 + blocks, smoothing)
+                           | _events(events), blocks)
         if len(section) <= blocks * BYTES:
             break
         blocks = -(-len(section) // BYTES)
@@ -82,7 +87,7 @@ def _at_constant_rate(path: Path, times: Array, values: Array) -> tuple[float, A
         raise ShadowPuppetError(f"{path}: {error}") from None
     if grid.frames is not None:
         return grid.rate, np.where((grid.frames >= 0)[:, None], values[np.maximum(grid.frames, 0)], np.nan)
-    warn(f"{path}: the frames do not come at a constant rate, which this format needs; they were found anew at {grid.rate:g} frames/s",
+    warn(f"{path}: the frames do not come at a constant rate, which this format needs; they were resampled at {grid.rate:g} frames/s",
          ShadowPuppetWarning, stacklevel=3)  # fmt: skip
     return grid.rate, resample(times, values, grid.rate)[1]
 
@@ -120,6 +125,17 @@ def _groups(names: Sequence[str], angles: Angles, rate: float, frames: tuple[int
              _real("CAMERA_RATE", rate)]
     done = {"PROCESSING": [_word("SMOOTHING", smoothing)]} if smoothing else {}
     return {"POINT": point, "ANALOG": analog, "TRIAL": trial, "MANUFACTURER": [_word("SOFTWARE", "shadowpuppet")], **done}
+
+
+def _events(events: Sequence[FootEvent]) -> dict[str, list[Parameter]]:
+    """The group EVENT: of each its time in minutes and seconds, the side, and what happens."""
+    events = events[:MAX_NAMES]
+    if not events:
+        return {}
+    times = np.array([divmod(event.time, 60) for event in events], "<f4")
+    sides = [event.side.capitalize() for event in events]
+    return {"EVENT": [_whole("USED", len(events)), *_words("CONTEXTS", sides), *_words("LABELS", [EVENTS[e.strike] for e in events]),
+                      ("TIMES", FLOAT, (2, len(events)), times.tobytes())]}  # fmt: skip
 
 
 def _whole(name: str, value: int) -> Parameter:

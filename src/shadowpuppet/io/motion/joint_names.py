@@ -37,6 +37,8 @@ SIDED = {
     "hip": ("hjc", "upleg", "upperleg", "thigh", "thighbend", "hip", "fep", "upperlegproximal"),
     "knee": ("kjc", "knee", "leg", "lowerleg", "lowleg", "shin", "calf", "feo", "lowerlegproximal"),
     "ankle": ("ajc", "ankle", "foot", "tio", "lowerlegdistal"),
+    "heel": ("heel",),
+    "toe": ("bigtoe",),  # `toe`, `toebase`: other points of other programs
 }
 """The same for joints with a side. `hand` is the wrist if there is no other name for it; `hjc`, ... are OpenSim's joint centres."""
 EITHER_SIDE = {

@@ -16,7 +16,7 @@ from shadowpuppet.io.files.lock import LOCK, locked
 from shadowpuppet.io.files.plain import for_toml
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.io.run import versions
+from shadowpuppet.io.run_writer import versions
 from shadowpuppet.pipeline.batch.grid import DEFAULT_CASE, Case, Grid
 from shadowpuppet.pipeline.batch.summary import BatchRun, check_table, done_run, found_runs, write_summary
 from shadowpuppet.pipeline.batch.task import PART, PLAN, RUNS

@@ -17,7 +17,7 @@ from typing import Any
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.files.text import read_text, write_whole
-from shadowpuppet.io.run import versions
+from shadowpuppet.io.run_writer import versions
 from shadowpuppet.pipeline.batch.tasks import named
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.progress import Listener

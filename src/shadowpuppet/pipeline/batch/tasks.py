@@ -15,6 +15,7 @@ from typing import Any
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.io.files.plain import plain
 from shadowpuppet.io.files.text import read_toml
+from shadowpuppet.io.projects import find_project
 from shadowpuppet.pipeline.batch.grid import MAX_RUNS, Case
 from shadowpuppet.pipeline.options import PATHS, make_options, plain_options
 from shadowpuppet.pipeline.silhouette_cache import film_of
@@ -156,9 +157,20 @@ def _files(path: Path) -> Iterator[tuple[str, Path]]:
         yield "", path
     elif path.is_dir():
         parts = [part for pattern in RUN_INPUTS for part in path.glob(pattern)]
-        for part in [*parts, *_elsewhere(path)] or [path]:  # a folder of pictures is one part
+        for part in [*parts, *_elsewhere(path), *_of_project(path)] or [path]:  # a folder of pictures is one part
             inside = part.rglob("*") if part.is_dir() else [part]
             yield from ((f"{part.name}/{file.relative_to(part)}", file) for file in inside if file.is_file())
+
+
+def _of_project(folder: Path) -> Iterator[Path]:
+    """Films, calibration and settings of another program's project."""
+    try:
+        project = find_project(folder)
+    except ShadowPuppetError:
+        return  # the run reports the error
+    if project is not None:
+        files = [*project.films.values(), folder / "Config.toml", *([project.calibration] if project.calibration else [])]
+        yield from (file for file in files if file.exists())
 
 
 def _elsewhere(folder: Path) -> Iterator[Path]:

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask, may_be_person
-from shadowpuppet.geometry import evenly_spread
-from shadowpuppet.pipeline.footage import CameraFrame, Sample
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import Array, evenly_spread
+from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample
+from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
-from shadowpuppet.tracking.people.carving import Room, make_room
-from shadowpuppet.tracking.people.columns import Column, find_people
+from shadowpuppet.tracking.people.figures import Figure, find_floor, find_people, telling
+from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.presence import counted
+from shadowpuppet.video.seeking import Seeker
 
 SETS = 12
 """Number of frame sets in which people are counted before the run."""
+LATER = 1.0
+"""Least length (s) of the rest of a film in which people are counted."""
+FLOOR_SETS = 6
+"""Number of those on which the floor is found."""
 LEAST_AREA, LEAST_HEIGHT = 0.15, 0.4
 """Least area and height of another person in a picture, over the largest part's: one two and a half times as far away."""
 FEW_POINTS = 50
@@ -27,16 +34,16 @@ FEW_POINTS = 50
 
 @dataclass(frozen=True, eq=False)
 class Census:
-    """The number of people, and the room in which they move."""
+    """The number of people, and the floor on which they move."""
 
     number: int
-    room: Room
+    floor: Floor
     numbers: tuple[int, ...]
     """People seen in each of the frame sets."""
 
-    def people(self, masks: Sequence[Mask | None]) -> list[Column]:
+    def people(self, masks: Sequence[Mask | None]) -> list[Figure]:
         """The people in one frame's masks (H, W), one per camera."""
-        return find_people(self.room, _telling(masks))
+        return find_people(self.floor, masks)
 
 
 def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes]) -> list[tuple[Mask | None, ...]]:
@@ -50,21 +57,37 @@ def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes]) 
                   for sample, each in zip(samples, silhouettes, strict=True)) for frame in chosen]  # fmt: skip
 
 
-def take_census(cameras: Sequence[Camera], sets: Sequence[Sequence[Mask | None]]) -> Census | None:
-    """The people in frame sets of masks (H, W), one per camera; None if nothing is seen by two cameras."""
-    hull, sets = VisualHull(cameras), [_telling(masks) for masks in sets]
+def later_sets(rig: Rig, silhouettes: Sequence[Silhouettes], after: float) -> list[tuple[Mask | None, ...]]:
+    """Masks (H, W) by camera at `SETS` moments at most, spread over the rest of the films `after` a time (s): of people who come later.
+    Found by seeking; none of ready silhouettes, and of films that do not state their length."""
+    ends = [footage.count / footage.film().rate for footage in rig.footage if footage.count and np.isfinite(footage.film().rate)]
+    begin = rig.recording.begin
+    if len(ends) < len(rig.footage) or any(each.segmenter is None for each in silhouettes) or begin + min(ends) < after + LATER:
+        return []
+    times = np.linspace(after + LATER / 2, begin + min(ends) - LATER / 2, SETS)
+    masks = [list(_at(footage, each, times)) for footage, each in zip(rig.footage, silhouettes, strict=True)]
+    return list(zip(*masks, strict=True))
+
+
+def _at(footage: Footage, silhouettes: Silhouettes, times: Array) -> Iterator[Mask | None]:
+    with Seeker(Path(str(footage.view.video)), footage.camera.size, footage.recording.rate) as seeker:
+        for time in times:
+            image = seeker.at(footage.view.start + float(time))
+            yield None if image is None else silhouettes(CameraFrame(float(time), image, None))
+
+
+def take_census(cameras: Sequence[Camera], sets: Sequence[Sequence[Mask | None]],
+                later: Sequence[Sequence[Mask | None]] = ()) -> Census | None:
+    """The people in frame sets of masks (H, W), one per camera, of the film's beginning and of what comes `later`; None if nothing is seen
+    by two cameras."""
+    hull, begun, sets = VisualHull(cameras), len(sets), [telling(masks) for masks in (*sets, *later)]
     points = [hull.points(masks).points for masks in sets]
     everywhere = np.concatenate(points) if points else np.zeros((0, 3))
     if len(everywhere) < FEW_POINTS:
         return None
-    room = make_room(cameras, everywhere)
-    numbers = tuple(len(find_people(room, masks)) for masks in sets)
-    return Census(counted(numbers), room, numbers)
-
-
-def _telling(masks: Sequence[Mask | None]) -> list[Mask | None]:
-    """The masks without those that are nearly all of their picture, as of a camera that turned black: these show a person everywhere."""
-    return [mask if mask is None or may_be_person(mask) or not mask.any() else None for mask in masks]
+    floor = find_floor(cameras, everywhere, [sets[n] for n in evenly_spread(len(sets), FLOOR_SETS)])
+    numbers = tuple(len(find_people(floor, masks)) for masks in sets)
+    return Census(max(counted(numbers[:begun]), counted(numbers[begun:])), floor, numbers)
 
 
 def count_in_picture(sample: Sample, silhouettes: Silhouettes) -> int:

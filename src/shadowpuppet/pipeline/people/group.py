@@ -10,30 +10,32 @@ import numpy as np
 
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
+from shadowpuppet.geometry import Array
 from shadowpuppet.pipeline.person_rig import HullObservation, MultiviewSubject
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState
-from shadowpuppet.tracking.people.carving import Room
-from shadowpuppet.tracking.people.columns import Column, find_people
 from shadowpuppet.tracking.people.evidence import Drawn, draw_person, predicted
+from shadowpuppet.tracking.people.figures import Figure, find_people
+from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.presence import Followed, follow
-from shadowpuppet.tracking.people.tracker import Person, Share, explained, place_of, start, step
+from shadowpuppet.tracking.people.tracker import Person, Share, explained, place_of, start, step, turn_round
+from shadowpuppet.tracking.people.walking import ALONG, Walk, step_of
 
 LOOK_SECONDS = 0.2
-"""Seconds from one look at the coarse hull to the next."""
+"""Seconds from one look for people to the next."""
 NEW_SECONDS, NEW_LOOKS = 0.5, 3
-"""Seconds and number of looks through which a column that no tracked body explains must last to count as a new person."""
+"""Seconds and number of looks through which a figure that no tracked body explains must last to count as a new person."""
 FORGET_SECONDS = 0.5
-"""Time after which such a column is forgotten."""
+"""Time after which such a figure is forgotten."""
 GONE_SECONDS = 1.0
 """Time for which a person is lost until they count as gone."""
 SAME_PLACE = 0.6
-"""Distance (m) from a person within which a column is theirs."""
+"""Distance (m) from a person within which a figure is theirs."""
 SAME_HEIGHT = 0.1
 """Greatest difference (m) between the height of a person who enters and that of one who has left, if they may be the same."""
 
-Sighting = tuple[Column, Sequence[Column], Sequence[Mask | None]]
-"""A person in a frame set: their column, the others', and the masks (H, W) by camera."""
+Sighting = tuple[Figure, Sequence[Figure], Sequence[Mask | None]]
+"""A person in a frame set: their figure, the others', and the masks (H, W) by camera."""
 Fit = Callable[[np.random.Generator, Sequence[Sighting]], MultiviewSubject]
 """Measures a person where they are seen, and makes the tracker."""
 
@@ -49,12 +51,17 @@ class Member:
     state: MultiviewState | None
     """None: gone."""
     height: float
-    """Extent of the coarse hull when the person stood tallest, metres."""
+    """Of the figure, metres."""
+    place: Array
+    """Where the figure was first seen, of shape (2,), metres."""
     lost_since: float | None = None
     before: Any = None
     """What the doubt about the next frame needs."""
     share: Share | None = None
     """The evidence of the last frame."""
+    walk: Walk = field(default_factory=Walk)
+    is_sided: bool = True
+    """Whether it is known where the person faces: from the silhouettes at the beginning, or because they walked."""
 
     @property
     def observation(self) -> HullObservation:
@@ -68,26 +75,46 @@ class Member:
 class Group:
     """All people of a recording, those who have left too."""
 
-    room: Room
+    floor: Floor
     hull: VisualHull
     fit: Fit
     rng: np.random.Generator
     members: list[Member] = field(default_factory=list)
     coming: list[Followed] = field(default_factory=list)
-    seen: dict[int, tuple[list[Column], Sequence[Mask | None]]] = field(default_factory=dict)
-    """Columns and masks of the looks that `coming` refers to, by number."""
+    seen: dict[int, tuple[list[Figure], Sequence[Mask | None]]] = field(default_factory=dict)
+    """Figures and masks of the looks that `coming` refers to, by number."""
     looks: int = 0
     due: float = -np.inf
 
-    def add(self, subject: MultiviewSubject, height: float) -> Member:
-        """A new person, not yet seen."""
-        self.members.append(Member(len(self.members) + 1, subject, self.rng.spawn(1)[0], None, height))
+    def add(self, subject: MultiviewSubject, height: float, place: Array) -> Member:
+        """A new person, not yet tracked, whose figure is first seen at a place (2,)."""
+        self.members.append(Member(len(self.members) + 1, subject, self.rng.spawn(1)[0], None, height, place))
         return self.members[-1]
+
+    def start(self, points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
+        """Begin with those who were measured, each at the nearest figure of the first frame set, which is given as for `next`."""
+        figures = find_people(self.floor, masks)
+        pairs = sorted((float(np.linalg.norm(figure.place - member.place)), member.number, n)
+                       for member in self.members for n, figure in enumerate(figures))  # fmt: skip
+        of = dict[int, Figure]()
+        for _, number, n in pairs:
+            if number not in of and all(figures[n] is not figure for figure in of.values()):
+                of[number] = figures[n]
+        for _ in range(2):  # again for those who were not clear before the others were known
+            for number, figure in of.items():
+                member = self.members[number - 1]
+                if member.state is None or member.state.status != "tracked":
+                    self.begin(member, figure, self.drawn(), points, masks)
 
     @property
     def present(self) -> list[Member]:
         """The people who are there."""
         return [member for member in self.members if member.state is not None]
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether all people are tracked and no other seems to come: else what bodies leave unexplained says nothing about cameras."""
+        return not self.coming and all(member.state is not None and member.state.status == "tracked" for member in self.present)
 
     def next(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
         """Update everybody by a frame's surface points and masks (H, W), one per camera."""
@@ -98,6 +125,7 @@ class Group:
             member.state, member.share = share.state, share
             lost = share.state.status == "lost"
             member.lost_since = (time if member.lost_since is None else member.lost_since) if lost else None
+            self._face_the_way(member, time)
         if time >= self.due:
             self.due = time + LOOK_SECONDS
             self._look(time, points, masks)
@@ -105,15 +133,31 @@ class Group:
             if member.lost_since is not None and time - member.lost_since >= GONE_SECONDS:
                 member.state = member.share = member.lost_since = member.before = None
 
+    def _face_the_way(self, member: Member, time: float) -> None:
+        """Turn a person round who has been carried backwards: beside others the front is hardly told from the back, but people walk
+        forwards."""
+        if member.state is None or member.share is None or member.lost_since is not None:
+            member.walk.forget()
+            return
+        member.walk.add(step_of(member.subject.body, member.state.pose, time))
+        if member.walk.forward > ALONG:
+            member.is_sided = True
+        elif member.walk.forward < -ALONG:
+            member.walk.forget()
+            turned = turn_round(member.subject.tracker, member.rng, member.share)
+            member.is_sided = turned is not None
+            if turned is not None:
+                member.state, member.share = turned, member.share._replace(state=turned)
+
     def _look(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
-        """Find those who come, or come back, or were lost, in the coarse hull."""
+        """Find those who come, or come back, or were lost, among the figures."""
         drawn = {member.number: member.share.drawn for member in self.present if member.share is not None and member.lost_since is None}
-        columns = find_people(self.room, masks, explained(drawn, len(masks)))
+        figures = find_people(self.floor, masks, explained(drawn, len(masks)))
         places = [place_of(member.subject.body, member.state) for member in self.present
                   if member.state is not None and member.lost_since is None]  # fmt: skip
-        free = [column for column in columns if all(np.linalg.norm(place - column.place) > SAME_PLACE for place in places)]
+        free = [figure for figure in figures if all(np.linalg.norm(place - figure.place) > SAME_PLACE for place in places)]
         self.looks += 1
-        self.seen[self.looks] = (columns, masks)
+        self.seen[self.looks] = (figures, masks)
         self.coming = follow([each for each in self.coming if time - each.times[-1] <= FORGET_SECONDS], self.looks, time, free)
         for each in list(self.coming):
             if len(each.sets) >= NEW_LOOKS and each.times[-1] == time and time - each.times[0] >= NEW_SECONDS - 1e-6:
@@ -124,24 +168,26 @@ class Group:
 
     def _enter(self, found: Followed, drawn: dict[int, Drawn], points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
         """Begin to track a person: one who was lost there, one who has left and is as tall, or a new one."""
-        column = found.columns[-1]
-        member = self._known(column, found.height)
+        figure = found.figures[-1]
+        member = self._known(figure, found.height)
         if member is None:
             try:
-                member = self.add(self.fit(self.rng, seen_in(found, self.seen)), found.height)
+                member = self.add(self.fit(self.rng, seen_in(found, self.seen)), found.height, figure.place)
             except TrackingError:
                 return
-        self.begin(member, column, drawn, points, masks)
+        self.begin(member, figure, drawn, points, masks)
 
-    def begin(self, member: Member, column: Column, drawn: dict[int, Drawn], points: SurfacePoints,
+    def begin(self, member: Member, figure: Figure, drawn: dict[int, Drawn], points: SurfacePoints,
               masks: Sequence[Mask | None]) -> None:
-        """Find a person's pose in a column of the coarse hull, beside those who are `drawn`."""
+        """Find a person's pose at the place of a figure, beside those who are `drawn`."""
         others = {number: body for number, body in drawn.items() if number != member.number}
-        state = start(member.subject.tracker, member.rng, column, others, points, masks)
-        if state is not None and state.status != "lost":
-            member.state, member.lost_since, member.before = state, None, None
+        begun = start(member.subject.tracker, member.rng, figure, others, points, masks)
+        if begun is not None and begun.state.status != "lost":
+            member.state, member.lost_since, member.before = begun.state, None, None
+            member.is_sided = begun.is_sided and member.subject.is_measured
+            member.walk.forget()
 
-    def _known(self, column: Column, height: float) -> Member | None:
+    def _known(self, figure: Figure, height: float) -> Member | None:
         """Who of those lost or gone may have come back; None for nobody."""
         away = [member for member in self.members if member.state is None or member.lost_since is not None]
         alike = [member for member in away if abs(member.height - height) <= SAME_HEIGHT]
@@ -149,7 +195,7 @@ class Group:
         def distance(member: Member) -> float:
             if member.state is None:
                 return 10.0 + abs(member.height - height)
-            return float(np.linalg.norm(place_of(member.subject.body, member.state) - column.place))
+            return float(np.linalg.norm(place_of(member.subject.body, member.state) - figure.place))
 
         return min(alike, key=distance, default=None)
 
@@ -159,18 +205,18 @@ class Group:
                 for member in self.present if member.state is not None}  # fmt: skip
 
 
-def seen_in(found: Followed, looks: Mapping[int, tuple[Sequence[Column], Sequence[Mask | None]]]) -> list[Sighting]:
-    """Where a person is seen among others; `looks`: all columns and the masks (H, W) of each frame set, by number."""
-    return [(column, [other for other in looks[n][0] if other is not column], looks[n][1]) for n, column in zip(found.sets, found.columns)]
+def seen_in(found: Followed, looks: Mapping[int, tuple[Sequence[Figure], Sequence[Mask | None]]]) -> list[Sighting]:
+    """Where a person is seen among others; `looks`: all figures and the masks (H, W) of each frame set, by number."""
+    return [(figure, [other for other in looks[n][0] if other is not figure], looks[n][1]) for n, figure in zip(found.sets, found.figures)]
 
 
-def first_people(room: Room, times: Sequence[float], sets: Sequence[Sequence[Mask | None]]) -> tuple[list[Followed], list[list[Column]]]:
+def first_people(floor: Floor, times: Sequence[float], sets: Sequence[Sequence[Mask | None]]) -> tuple[list[Followed], list[list[Figure]]]:
     """The people in the first seconds' masks (H, W), by time and camera: those seen in half of the sets or more, the longest seen first;
-    and all columns of each set."""
-    people, every = list[Followed](), list[list[Column]]()
+    and all figures of each set."""
+    people, every = list[Followed](), list[list[Figure]]()
     for n, (time, masks) in enumerate(zip(times, sets, strict=True)):
-        every.append(find_people(room, masks))
+        every.append(find_people(floor, masks))
         people = follow(people, n, time, every[-1])
     lasting = [each for each in people if 2 * len(each.sets) >= len(sets)]
-    return sorted(lasting, key=lambda each: (-len(each.sets), float(each.columns[0].place[0]))), every
+    return sorted(lasting, key=lambda each: (-len(each.sets), float(each.figures[0].place[0]))), every
 

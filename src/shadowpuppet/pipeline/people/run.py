@@ -12,12 +12,12 @@ from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Bits
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.people import PEOPLE, person_folder, write_header, write_place
-from shadowpuppet.io.run import RunWriter, read_run, write_metrics
+from shadowpuppet.io.run import read_run
+from shadowpuppet.io.run_writer import RunWriter, write_metrics
 from shadowpuppet.motion.motion import JointTable, Motion, MotionFrame
 from shadowpuppet.motion.synchronization import at_common_times
 from shadowpuppet.pipeline.look import RigLook, Survey
@@ -109,18 +109,18 @@ class PeopleRun:
 
     def _group(self, for_fit: np.random.Generator, for_track: np.random.Generator) -> Group:
         """Everybody who is there in the first seconds, measured."""
-        rate, room = self.rig.rate / self.options.every, self.census.room
+        rate, floor = self.rig.rate / self.options.every, self.census.floor
         first = self.survey.first
 
         def fit(rng: np.random.Generator, sets: Sequence[Any]) -> MultiviewSubject:
-            return fit_apart(rng, self.rig.cameras, room, self.options, rate, sets)
+            return fit_apart(rng, self.rig.cameras, floor, self.options, rate, sets)
 
-        group = Group(room, VisualHull(self.rig.cameras, self.options.multiview.hull), fit, for_track)
-        people, every = first_people(room, first.times, first.masks)
+        group = Group(floor, VisualHull(self.rig.cameras, self.options.multiview.hull), fit, for_track)
+        people, every = first_people(floor, first.times, first.masks)
         seen = dict(enumerate(zip(every, first.masks)))
         for found in people:
             try:
-                group.add(fit(for_fit, seen_in(found, seen)), found.height)
+                group.add(fit(for_fit, seen_in(found, seen)), found.height, found.figures[0].place)
             except TrackingError:
                 continue  # may be found later
         return group
@@ -148,10 +148,11 @@ class PeopleRun:
                     points = group.hull.points(masks)
                 with timer.time("track"):
                     if not begun and len(points.points):
-                        begun = self._begin(group, seen.time, points, masks)
-                    else:
-                        group.next(seen.time, points, masks)
-                    watch.tracked(_together([member.subject.drawn(member.state) for member in group.present]))
+                        begun = True
+                        group.start(points, masks)
+                    group.next(seen.time, points, masks)
+                    drawn = [member.subject.drawn(member.state) for member in group.present]
+                    watch.tracked(_together(drawn) if group.is_clear else ())
                 with timer.time("write"):
                     found = self._write(group, seen, stack, places)
                     if overlay is not None:
@@ -162,15 +163,11 @@ class PeopleRun:
         finally:
             self.metrics |= timings(timer, STAGES, count, time.perf_counter() - began) | set_aside(watch.intervals, self.rig.names)
 
-    def _begin(self, group: Group, seconds: float, points: Any, masks: Sequence[Mask | None]) -> bool:
-        """Find those who were measured in the first frame set that shows anybody: each in the column that fits their height best."""
-        columns, free = self.census.people(masks), list(group.members)
-        for column in columns:
-            if member := min(free, key=lambda each: abs(each.height - column.height), default=None):
-                free.remove(member)
-                group.begin(member, column, group.drawn(), points, masks)
-        group.next(seconds, points, masks)
-        return True
+    @staticmethod
+    def _doubted(frame: MotionFrame) -> MotionFrame:
+        """The frame of a person whose front is not told from the back: nothing of it is `tracked`."""
+        limbs = None if frame.limb_status is None else ["uncertain" if status == "tracked" else status for status in frame.limb_status]
+        return frame._replace(status="uncertain" if frame.status == "tracked" else frame.status, limb_status=limbs)
 
     def _write(self, group: Group, seen: FrameSet, stack: ExitStack, places: BinaryIO) -> dict[int, MotionFrame]:
         """Write a frame of everybody who has come so far."""
@@ -182,6 +179,7 @@ class PeopleRun:
                 frame, member.before = MotionFrame(seen.time, "absent"), None
             else:
                 frame, member.before = motion_frame(member.subject, seen.time, member.state, member.observation, member.before)
+                frame = frame if member.is_sided else self._doubted(frame)
             self._writer(member, stack).write(frame)
             here = frame.status not in ("absent", "lost") and member.state is not None
             place = place_of(member.subject.body, member.state) if here and member.state is not None else np.full(2, np.nan)
@@ -216,15 +214,15 @@ def matched_truths(motions: Mapping[int, Motion], truths: Sequence[Path]) -> dic
     if not tables or not motions:
         return {}
     away = np.array([[_apart(motion, table) for _, table in tables] for motion in motions.values()])
-    rows, columns = linear_sum_assignment(np.where(np.isfinite(away), away, 1e6))
-    return {list(motions)[row]: tables[column][0] for row, column in zip(rows, columns) if away[row, column] < SAME_PERSON}
+    rows, figures = linear_sum_assignment(np.where(np.isfinite(away), away, 1e6))
+    return {list(motions)[row]: tables[figure][0] for row, figure in zip(rows, figures) if away[row, figure] < SAME_PERSON}
 
 
 def _read(path: Path) -> tuple[Path, JointTable] | None:
     try:
         return path, read_truth(path)
     except ShadowPuppetError as error:
-        warn(f"{path}: no errors are told: {error}", ShadowPuppetWarning, stacklevel=2)
+        warn(f"{path}: no errors are computed: {error}", ShadowPuppetWarning, stacklevel=2)
         return None
 
 

@@ -14,7 +14,8 @@ from shadowpuppet.calibration.results import keep_old
 from shadowpuppet.errors import RecordingError, reason
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import read_toml, write_whole
-from shadowpuppet.pipeline.check_calibration import CalibrationCheck, SilhouetteSets, aligned_sets
+from shadowpuppet.pipeline.repair.check import aligned_sets
+from shadowpuppet.pipeline.repair.films import Checked
 from shadowpuppet.pipeline.rig import Rig
 
 
@@ -30,17 +31,17 @@ class Fix:
     """Name and disagreement with the others, pixels, before and after, of each camera; None if unknown."""
 
 
-def fix_recording(rig: Rig, sets: SilhouetteSets, found: CalibrationCheck) -> Fix:
+def fix_recording(rig: Rig, checked: Checked) -> Fix:
     """Write certain delays into [start] of recording.toml, and certain rotations into a new calibration.toml. Changes nothing that leaves
     the cameras more apart than before. Raises `RecordingError` if the recording is no folder or a file cannot be written."""
-    folder = rig.recording.path
+    folder, found = rig.recording.path, checked.check
     if found.agreement.remedy is not None or not (found.starts or found.turns):
         return Fix(done=(), files=(), pixels=())
     if not folder.is_dir():
         raise RecordingError(f"{folder}: expected a folder, as [start] and calibration.toml are written into it")
-    before = compare_cameras(rig.cameras, aligned_sets(sets.rows, [0.0] * len(rig.cameras)), remedies=False)
+    before = compare_cameras(rig.cameras, aligned_sets(checked.before.rows, [0.0] * len(rig.cameras)), remedies=False)
     turned = tuple(found.turns[camera.name].turn.of(camera) if camera.name in found.turns else camera for camera in rig.cameras)
-    after = compare_cameras(turned, aligned_sets(sets.rows, _shifts(rig, sets, found)), remedies=False)
+    after = compare_cameras(turned, aligned_sets(checked.sets.rows, _shifts(rig, checked)), remedies=False)
     pixels = tuple(zip(rig.names, before.apart, after.apart))
     if sum(apart or 0.0 for apart in after.apart) > sum(apart or 0.0 for apart in before.apart) + 0.1 * len(rig.cameras):
         return Fix(done=(), files=(), pixels=pixels)
@@ -61,10 +62,13 @@ def fix_recording(rig: Rig, sets: SilhouetteSets, found: CalibrationCheck) -> Fi
     return Fix(done=tuple(done), files=tuple(map(str, files)), pixels=pixels)
 
 
-def _shifts(rig: Rig, sets: SilhouetteSets, found: CalibrationCheck) -> list[float]:
-    """Sets by which each film is late, of those that are late for certain."""
+def _shifts(rig: Rig, checked: Checked) -> list[float]:
+    """Sets by which each film is late in the sets compared, of those that are late for certain."""
+    found, sets = checked.check, checked.sets
     frames = dict(zip(found.lateness.names, found.lateness.frames)) if found.lateness is not None else {}
-    return [(frames.get(name) or 0.0) / sets.every if name in found.late else 0.0 for name in rig.names]
+    gone = dict(zip(found.sound.names, found.sound.seconds)) if found.sound is not None and found.by_sound else {}
+    return [((frames.get(name) or 0.0) - (gone.get(name) or 0.0) * rig.rate) / sets.every if name in found.late else 0.0
+            for name in rig.names]
 
 
 def _write_notes(path: Path, changes: Mapping[str, Any]) -> list[Path]:

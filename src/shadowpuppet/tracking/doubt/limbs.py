@@ -13,11 +13,12 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import doubtful_joints, doubtful_limbs
 
 GROUPS = {"pelvis": ("pelvis",), "neck": ("neck", "head"), "shoulder": ("shoulder",), "elbow": ("elbow",),
-          "hand": ("wrist", "hand", "fist"), "hip": ("hip",), "knee": ("knee",), "ankle": ("ankle",)}
+          "hand": ("wrist", "hand", "fist"), "hip": ("hip",), "knee": ("knee",), "ankle": ("ankle", "heel", "toe")}
 """Groups of joints that share their factors of doubt; left and right are alike."""
 _GROUP_OF = {joint: group for group, joints in GROUPS.items() for joint in joints}
 LEG_PARTS = ("thigh", "shank", "foot", "upper_leg", "lower_leg")
-LEVER = {"shoulder": 0.15, "elbow": 0.3, "wrist": 0.55, "hand": 0.6, "fist": 0.7, "hip": 0.15, "knee": 0.4, "ankle": 0.8}
+LEVER = {"shoulder": 0.15, "elbow": 0.3, "wrist": 0.55, "hand": 0.6, "fist": 0.7, "hip": 0.15, "knee": 0.4, "ankle": 0.8,
+         "heel": 0.8, "toe": 0.8}
 """Distance (m) by which a joint may be off if nothing is known of its limb's direction."""
 TRUNK_LEVER = 0.3
 

@@ -18,7 +18,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, joints_of_limbs, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import levers_of, limb_of_part
-from shadowpuppet.tracking.doubt.mirror import Mirrors
+from shadowpuppet.tracking.doubt.mirror import TOGETHER_ALLOWED, Mirrors
 from shadowpuppet.tracking.doubt.steps import CONSTANT, Trail, stillness, surprise
 from shadowpuppet.tracking.frozen import is_frozen, same_silhouette
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
@@ -78,8 +78,8 @@ class MonocularDoubt:
         the view; the distance in depth to its mirror image, which draws the same silhouette (an arm before or behind the body, the trunk
         turned to the left or right); the error of depth by foreshortening; of its limb, the hidden share, the silhouette near it that
         nothing explains, the share outside the silhouette and the share outside the picture, times the joint's lever; how far it
-        left its course; the misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; and the
-        error of the person's distance.
+        left its course; the misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; the
+        distances to the images of each arm, and of the trunk with both; and the error of the person's distance.
         """
         points = self.tracker.picture.points(state.pose[None])[0]
         at, lever = dict(zip(self.names, points)), levers_of(self.names)
@@ -106,6 +106,7 @@ class MonocularDoubt:
         }
         components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}
         components["alternative"] = images.displacements(points)
+        components["together"] = self._mirrors.together(state.pose, points, observation).displacements(points, TOGETHER_ALLOWED)
         components["distance"] = points * (0, 0, DISTANCE)
         unseen = {limb: max(hidden, cut) for limb, (hidden, _, _, cut) in shares.items()}
         since = before.since if still and before is not None else seconds

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from shadowpuppet.body.segments import PULLED_POINTS, coarse_limbs
+from shadowpuppet.body.upper_body import TWIST
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
@@ -18,6 +19,8 @@ from shadowpuppet.tracking.silhouette_cost import Cost, Observation
 
 TORSO_SPREAD, LIMB_SPREAD = 0.3, 0.2
 """Standard deviations (rad) of explored candidates: the torso's angles about upright, a limb's about a coarse posture."""
+TURNED_SHARE = 0.5
+"""Share of the torso's explored candidates that are turned anywhere, in a silhouette too narrow for the trunk as it was."""
 MEAN_TEMPERATURE = 50.0
 """For the mean estimate: a particle's weight falls to 1/e for this much more cost (pixels at 320 x 240)."""
 
@@ -31,20 +34,33 @@ def make_stage(picture: Picture, settings: MonocularSettings, name: str, scheme:
 class ExtendedStage(FilterStage):
     """A stage with exploration, a pull to usual postures, a pull to the last frame, and a mean estimate, as set in the settings."""
 
-    def propose(self, cycle: int) -> Propose:
+    def propose(self, cycle: int, narrow: bool = False) -> Propose:
         """The paper's noise; in the first cycle of a stage of one part also `explore` candidates."""
         noise, number = super().propose(cycle), self.settings.explore
         if cycle or len(self.parts) > 1 or not number:
             return noise
-        return lambda rng, values: np.concatenate([noise(rng, values), self.clamp(self.explore(rng, values[0], number))])
+        return lambda rng, values: np.concatenate([noise(rng, values), self.clamp(self.explore(rng, values[0], number, narrow))])
 
-    def explore(self, rng: np.random.Generator, best: Array, number: int) -> Array:
-        """Values (number, d) from the part's whole range, which the noise of one frame cannot reach from `best` (d,)."""
+    def explore(self, rng: np.random.Generator, best: Array, number: int, narrow: bool = False) -> Array:
+        """Values (number, d) from the part's whole range, which the noise of one frame cannot reach from `best` (d,). `narrow`: as in
+        `propose`."""
         if self.moves_torso:
             spread = np.where(self.rotates, TORSO_SPREAD, 5 * self.settings.torso.sigma_translation)
-            return np.where(self.rotates, 0.0, best) + rng.standard_normal((number, len(best))) * spread
+            values = np.where(self.rotates, 0.0, best) + rng.standard_normal((number, len(best))) * spread
+            if narrow:
+                self._turn(rng, values[: round(TURNED_SHARE * number)], best)
+            return values
         limbs = coarse_limbs(self.picture.body.skeleton, self.parts[0])
         return limbs[rng.integers(len(limbs), size=number)] + LIMB_SPREAD * rng.standard_normal((number, len(best)))
+
+    def _turn(self, rng: np.random.Generator, values: Array, best: Array) -> None:
+        """Fill values (N, d) with the torso as in `best` (d,), but turned anywhere to its side: the other side looks the same, and the mean
+        of both would not be turned."""
+        skeleton = self.picture.body.skeleton
+        (twist,) = np.flatnonzero(self.dofs == skeleton.dof_names.index(TWIST))
+        end = skeleton.limits[int(best[twist] > 0)][self.dofs[twist]]
+        values[:] = best + rng.standard_normal(values.shape) * self.sigma
+        values[:, twist] = rng.uniform(min(end, 0), max(end, 0), len(values))
 
     def extra_costs(self, observation: Observation, last: Array) -> list[Cost]:
         """The pulls to usual postures and to the last frame's estimate (D,), and the caller's own cost."""

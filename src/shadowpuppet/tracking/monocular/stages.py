@@ -55,8 +55,9 @@ class FilterStage:
             poses = keep_limb_directions(self.picture.body.skeleton, pose, poses, self.other_legs)
         return poses if values.ndim == 2 else poses[0]
 
-    def propose(self, cycle: int) -> Propose:
-        """Gaussian noise on every particle but the first (Algorithms 3 and 4), multiplied by `cooling` for every further cycle."""
+    def propose(self, cycle: int, narrow: bool = False) -> Propose:
+        """Gaussian noise on every particle but the first (Algorithms 3 and 4), multiplied by `cooling` for every further cycle. `narrow`:
+        whether the silhouette is too narrow for the trunk as it was, which only the extended stage uses."""
         sigma = self.sigma * self.settings.cooling**cycle
         return lambda rng, values: self.clamp(diffuse(rng, values, sigma))
 

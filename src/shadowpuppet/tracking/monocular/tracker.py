@@ -7,10 +7,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.body.segments import dofs_of, limbs_of
+from shadowpuppet.body.upper_body import TWIST
 from shadowpuppet.camera.mask import Mask, check_mask
-from shadowpuppet.camera.rasterize import Picture, count
+from shadowpuppet.camera.rasterize import Picture, count, pack
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular import pose_search
 from shadowpuppet.tracking.monocular.extended_stage import make_stage
@@ -22,6 +24,11 @@ from shadowpuppet.tracking.resampling import Scheme
 from shadowpuppet.tracking.silhouette_cost import Cost, Observation
 from shadowpuppet.tracking.status import ABSENT_AREA, status_of
 from shadowpuppet.tracking.unexplained import Unexplained, look_beside, without
+
+NARROW = 0.08
+"""Share of the trunk outside the silhouette above which the person has turned: when they turn quickly it is 0.1 to 0.2, and otherwise, made
+people bending, boxing and twisting, below 0.06."""
+TRUNK = ("torso", "waist")
 
 
 class State(NamedTuple):
@@ -78,12 +85,14 @@ class MonocularTracker:
         last, particles = state.pose, list(state.particles)
         estimate, whole = last, self.observe(mask, last, also, state.unexplained)
         observation = whole if state.mask is None else whole.ignoring(mask & ~state.mask)
+        narrow = self.settings.turned and self.is_narrow(mask, last)
         for cycle in range(self.settings.cycles):
             others = estimate  # values of the DOF outside a stage; later stages see the torso's new estimate, but not a limb's
             for i, stage in enumerate(self.stages):
                 weigh = stage.weigh(observation, others, last)
                 ranked = evaluate(particles[i].poses, weigh) if self.settings.rank_by == "new" else particles[i]  # eq. 8 as printed
-                particles[i] = step(rng, ranked, resample=stage.resample, propose=stage.propose(cycle), weigh=weigh, number=stage.number)
+                propose = stage.propose(cycle, narrow)
+                particles[i] = step(rng, ranked, resample=stage.resample, propose=propose, weigh=weigh, number=stage.number)
                 estimate = stage.put(estimate, stage.estimate(particles[i]))
                 others = estimate if stage.moves_torso else others
         return self.judge(estimate, particles, whole)
@@ -133,6 +142,20 @@ class MonocularTracker:
     def is_absent(self, mask: Mask, pose: Array) -> bool:
         """Whether a mask (H, W) is too small to be the person last seen in `pose` (D,)."""
         return int(np.count_nonzero(mask)) < max(ABSENT_AREA * count(self.picture.draw(pose)), 1)
+
+    def is_narrow(self, mask: Mask, pose: Array) -> bool:
+        """Whether the trunk in a pose (D,) sticks out of a mask (H, W), as it does when the person turns quickly."""
+        if not len(self._trunk):
+            return False
+        trunk = self.picture.draw(pose, self._trunk)
+        return count(trunk & ~pack(mask)) > NARROW * count(trunk)
+
+    @cached_property
+    def _trunk(self) -> NDArray[np.int64]:
+        """Indices of the trunk's shapes; none of a body whose trunk does not twist."""
+        if TWIST not in self.picture.body.skeleton.dof_names:
+            return np.zeros(0, np.int64)
+        return np.flatnonzero([part in TRUNK for part in self.picture.body.parts])
 
     @staticmethod
     def absent(state: State) -> State:

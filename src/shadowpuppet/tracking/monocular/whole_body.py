@@ -26,6 +26,8 @@ UPRIGHT = 0.12
 shows only some three quarters of a standing person's height."""
 WIDTH_FACTORS = np.arange(0.75, 1.61, 0.05)
 """Factors on widths that are tried."""
+WIDEST = 2
+"""Number of the widest silhouettes in which widths are fitted."""
 WIDTH_GROUPS = (
     ("pelvis_width", "waist_width", "chest_width", "trunk_width"),
     ("thigh_width", "knee_width", "calf_width", "ankle_width", "shank_width"),
@@ -70,13 +72,14 @@ def _soles_row(picture: Picture, sizes: BoneSizes) -> float:
 
 
 def _with_clothes(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, sizes: BoneSizes, body: str) -> PersonEstimate:
-    """The estimate with the widths of least silhouette cost, in poses that are searched once."""
-    first_last = [masks[0], masks[-1]]
-    poses = [search_pose(estimate.picture(camera, body), mask).pose for mask in first_last]
+    """The estimate with the widths of least silhouette cost, in poses that are searched once; in the widest silhouettes, whose arms are off
+    the trunk: it would grow over hanging ones."""
+    widest = sorted(masks, key=lambda mask: int(np.ptp(np.flatnonzero(mask.any(0)))))[-WIDEST:]
+    poses = [search_pose(estimate.picture(camera, body), mask).pose for mask in widest]
     for names in WIDTH_GROUPS:
         widths = {name: getattr(sizes, name) for name in names if name in sizes.names()}
         tried = [sizes.with_values(**{name: factor * width for name, width in widths.items()}) for factor in WIDTH_FACTORS]
-        sizes = tried[int(np.argmin([_silhouette_cost(camera, first_last, poses, replace(estimate, sizes=each), body) for each in tried]))]
+        sizes = tried[int(np.argmin([_silhouette_cost(camera, widest, poses, replace(estimate, sizes=each), body) for each in tried]))]
     return replace(estimate, sizes=sizes)
 
 

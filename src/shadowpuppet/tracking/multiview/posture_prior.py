@@ -14,6 +14,8 @@ INFLATION, MIN_DEVIATION = 1.5, 0.15
 """Factor and minimum (rad) of the training poses' standard deviations; test poses vary more."""
 OBSERVED_JOINTS = ("left_", "right_")
 """Prefixes of joints whose angles the surface shows well enough; they have no prior."""
+UNSHOWN = ("_ankle_inversion",)
+"""Ends of the names of their DOF that it does not show: a foot's roll hardly changes the hull."""
 MAX_PENALTY = 9.0
 """Bound of each DOF's penalty: that of three standard deviations (see `Skeleton.posture_penalty`)."""
 
@@ -41,7 +43,7 @@ class PosturePrior:
             known = np.isfinite(below)
             spread = np.maximum(INFLATION * library.std(0), MIN_DEVIATION)
             rest, below, above = (np.where(known, new, old) for new, old in ((library.mean(0), rest), (spread, below), (spread, above)))
-        constrained = np.array([not dof.joint.startswith(OBSERVED_JOINTS) for dof in skeleton.dofs])
+        constrained = np.array([not dof.joint.startswith(OBSERVED_JOINTS) or dof.name.endswith(UNSHOWN) for dof in skeleton.dofs])
         return cls(rest, np.where(constrained, below, np.inf), np.where(constrained, above, np.inf))
 
     def penalty(self, poses: Array) -> Array:

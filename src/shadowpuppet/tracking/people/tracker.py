@@ -13,7 +13,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.tracking.people.columns import Column
+from shadowpuppet.tracking.particle_filter import Particles
 from shadowpuppet.tracking.people.evidence import (
     Drawn,
     PersonObservation,
@@ -24,12 +24,18 @@ from shadowpuppet.tracking.people.evidence import (
     picked,
     predicted,
 )
+from shadowpuppet.tracking.people.figures import Figure
+from shadowpuppet.tracking.recovery import settle
 from shadowpuppet.tracking.unexplained import near
 
 TOUCHING = 0.25
 """Distance of two people's bodies below which they are estimated twice in a frame: the second time on evidence divided by the first."""
-ROUND_COLUMN = 0.6
-"""Distance (m) from a column's axis up to which surface points are searched for its person."""
+SIDED = 0.01
+"""Least difference in overlap between a body and the same turned round that tells the front from the back."""
+TURN_LOSS = 0.05
+"""Overlap by which a body turned round may fit worse if the person walks that way: among others front and back differ by 0.02."""
+ROUND_FIGURE = 0.6
+"""Distance (m) from a figure up to which surface points are searched for its person."""
 
 
 class Person(NamedTuple):
@@ -38,6 +44,14 @@ class Person(NamedTuple):
     tracker: MultiviewTracker
     rng: np.random.Generator
     state: MultiviewState
+
+
+class Begun(NamedTuple):
+    """The first state of a person."""
+
+    state: MultiviewState
+    is_sided: bool
+    """Whether the silhouettes tell the front from the back."""
 
 
 class Share(NamedTuple):
@@ -74,11 +88,11 @@ def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Ma
     return shares
 
 
-def start(person: MultiviewTracker, rng: np.random.Generator, column: Column, drawn: Mapping[int, Drawn], points: SurfacePoints,
-          masks: Sequence[Mask | None]) -> MultiviewState | None:
-    """The first state of a person in a column of the coarse hull, beside those who are `drawn`; None if there are too few points. Points
+def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, drawn: Mapping[int, Drawn], points: SurfacePoints,
+          masks: Sequence[Mask | None]) -> Begun | None:
+    """The first state of a person at the place of a figure, beside those who are `drawn`; None if there are too few points. Points
     and masks (H, W) as in `step`."""
-    mine = np.linalg.norm(points.points[:, :2] - column.place, axis=1) < ROUND_COLUMN
+    mine = np.linalg.norm(points.points[:, :2] - figure.place, axis=1) < ROUND_FIGURE
     for other in drawn.values():
         mine &= other.distances(points.points) > 0.05
     own = picked(points, mine)
@@ -88,7 +102,37 @@ def start(person: MultiviewTracker, rng: np.random.Generator, column: Column, dr
     found = person.search(rng, PersonObservation(person.views, own, [None] * len(masks)))  # the points alone: where the person is
     body = draw_person(person, found.pose)
     observation = PersonObservation(person.views, own, masks, None, ignored_pixels(body, list(drawn.values()), masks))
-    return _judged(person.search(rng, observation))
+    found = person.search(rng, observation)  # beside others the front is hardly told from the back: both are tried
+    other = _facing_the_other_way(person, rng, found, observation)
+    best = max(found, other, key=lambda state: np.nan_to_num(state.overlap))
+    return Begun(_judged(best), bool(abs(found.overlap - other.overlap) >= SIDED))
+
+
+def turn_round(person: MultiviewTracker, rng: np.random.Generator, share: Share) -> MultiviewState | None:
+    """The person of a share facing the other way, fitted to the same evidence; None if that fits clearly worse."""
+    other = _facing_the_other_way(person, rng, share.state, PersonObservation(person.views, share.points, share.masks))
+    worse = np.nan_to_num(share.state.overlap) - np.nan_to_num(other.overlap)
+    return _judged(other) if worse <= TURN_LOSS else None
+
+
+def _facing_the_other_way(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState,
+                          observation: PersonObservation) -> MultiviewState:
+    return settle(_turned_round(person, state), lambda other: person.cycle(rng, other, observation))
+
+
+def _turned_round(person: MultiviewTracker, state: MultiviewState) -> MultiviewState:
+    """A state with the body turned to face the other way; the arms and legs of one side are those of the other."""
+    skeleton, pose = person.body.skeleton, state.pose.copy()
+    names = skeleton.dof_names
+    sides = ("left_", "right_")
+    for n, name in enumerate(names):
+        for one, other in (sides, sides[::-1]):
+            if name.startswith(one):
+                pose[n] = state.pose[names.index(other + name.removeprefix(one))]
+    pose[skeleton.dof_indices(GLOBAL_DOFS[3:])[0]] += np.pi
+    still = np.zeros_like(pose)
+    particles = Particles(np.repeat(pose[None], person.number, 0), *np.zeros((2, person.number)))
+    return state._replace(pose=pose, velocity=still, particles=particles)
 
 
 def touching(drawn: Mapping[int, Drawn]) -> list[int]:
@@ -102,10 +146,10 @@ def touching(drawn: Mapping[int, Drawn]) -> list[int]:
 
 
 def explained(drawn: Mapping[int, Drawn], number: int) -> list[Mask]:
-    """Pixels (H / 4, W / 4) of each of a `number` of cameras that people's bodies explain; empty without people."""
+    """Pixels (H / 2, W / 2) of each of a `number` of cameras that people's bodies explain; empty without people."""
     if not drawn:
         return []
-    return [np.logical_or.reduce([near(one.masks[n])[::2, ::2] for one in drawn.values()]) for n in range(number)]
+    return [np.logical_or.reduce([near(one.masks[n]) for one in drawn.values()]) for n in range(number)]
 
 
 def _others(drawn: Mapping[int, Drawn], n: int, lost: Container[int]) -> list[Drawn]:

@@ -16,27 +16,27 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.body.upper_body import BEND, TWIST
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import filled, true_runs
 from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import Motion
 
-TWIST, BEND = "torso_twist", "torso_bend"
 NEAR, STEADY, PROFILE = np.radians(50), np.radians(62), np.radians(70)
 """Twist of the trunk (rad) about a profile; and that which a profile reaches at least, as a median of three frames and in one: the trunk
 of a boxer twists by 69 degrees."""
 AT_LEAST = np.radians(60)
 """The twist (rad), both of three frames and of one, that is enough if the head shows that it is a profile: a tracker may lag behind a quick
 turn."""
-SHORTEST, LONGEST = 0.15, 0.8
-"""Time (s) that the passing of a profile lasts. To turn so far and back in less than this, a trunk would have to be jerked round
-(20 rad/s^2)."""
+SHORTEST, BRIEF, LONGEST = 0.15, 0.1, 0.8
+"""Time (s) that the passing of a profile lasts, at least, and at least if the head shows that it is one; and at most. To turn so far and
+back in less than this, a trunk would have to be jerked round (20 rad/s^2)."""
 LEAVING = 0.3
 """Time (s) from standing frontally to a profile."""
 FRONTAL, AROUND = np.radians(35), 0.4
 """Mean twist (rad) below which a person stands frontally, and the time (s) for which they do so before and after."""
 CLEAR = 0.04
-"""Mean lean of the head (`head_lean`) in a profile, from which on it says which way the person faces; of made people it is 0.08 to 0.13."""
+"""Median lean of the head (`head_lean`) in a profile, from which on it says which way the person faces; 0.08 to 0.13 of made people."""
 EDGE = np.radians(10)
 """Twist (rad) up to which the passing of a profile reaches that is turned to the other side."""
 
@@ -51,8 +51,8 @@ def turns(motion: Motion, leans: Array | None = None) -> list[int]:
     for begin, end in true_runs(np.abs(steady) > NEAR):
         peak, lasted = begin + int(np.abs(steady[begin:end]).argmax()), motion.times[end - 1] - motion.times[begin]
         shown = leans is not None and abs(_lean(leans[begin:end])) >= CLEAR
-        least, constant = (AT_LEAST, AT_LEAST) if shown else (PROFILE, STEADY)
-        if np.abs(twist[begin:end]).max() < least or abs(steady[peak]) < constant or not SHORTEST <= lasted <= LONGEST:
+        least, constant, shortest = (AT_LEAST, AT_LEAST, BRIEF) if shown else (PROFILE, STEADY, SHORTEST)
+        if np.abs(twist[begin:end]).max() < least or abs(steady[peak]) < constant or not shortest <= lasted <= LONGEST:
             continue
         before, after = np.searchsorted(motion.times, [motion.times[begin] - LEAVING - AROUND, motion.times[end - 1] + LEAVING + AROUND])
         first, last = np.searchsorted(motion.times, [motion.times[begin] - LEAVING, motion.times[end - 1] + LEAVING])
@@ -109,9 +109,9 @@ def _wrong_way(motion: Motion, at: list[int], leans: Array) -> NDArray[np.bool_]
 
 
 def _lean(leans: Array) -> float:
-    """Mean of the head's leans (N,) in a profile; 0 if most are unknown."""
+    """Median of the head's leans (N,) in a profile; 0 if most are unknown."""
     known = leans[np.isfinite(leans)]
-    return float(known.mean()) if 2 * len(known) >= max(len(leans), 1) else 0.0
+    return float(np.median(known)) if 2 * len(known) >= max(len(leans), 1) else 0.0
 
 
 def _around(inside: NDArray[np.bool_], frame: int) -> slice:

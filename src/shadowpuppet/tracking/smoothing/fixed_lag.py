@@ -1,7 +1,7 @@
 """Fixed-lag smoothing: every pose as soon as some of the next are there, by the same cost as the pass over a whole film.
 
 Poses that were given out count as known to a few millimetres, so that the motion goes on from them without a step. The frames since then
-are estimated anew with every frame, from the last estimate on.
+are estimated again with every frame, from the last estimate on.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ PAST = 0.15
 GIVEN_SD = 0.003
 """Deviation (m, and 1 for axes) of markers of poses that were given out."""
 PAUSE = 0.5
-"""Time (s) without a pose after which the motion begins anew."""
+"""Time (s) without a pose after which the motion begins again."""
 ROUNDS, STEPS = 2, 2
 """Rounds of estimating speeds and outliers, and Gauss-Newton steps, a frame: each goes on from the last frame's."""
 

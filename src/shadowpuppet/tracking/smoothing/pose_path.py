@@ -29,7 +29,8 @@ MAX_STEP = 0.3
 
 
 class PathCost(NamedTuple):
-    """What a path of markers (T, R), metres or no unit, costs: sum(precision (z - measured)^2) + sum((third difference)^2 / variance)."""
+    """What a path of markers (T, R), metres or no unit, costs: sum(precision (z - measured)^2) + sum((third difference)^2 / variance), and
+    sum(still (first difference)^2) for what stands."""
 
     measured: Array
     """Of shape (T, R)."""
@@ -39,10 +40,13 @@ class PathCost(NamedTuple):
     """Coefficients of the third differences, of shape (T - 3, 4)."""
     variance: Array
     """Of the third differences, of shape (T - 3, R)."""
+    still: Array | None = None
+    """Precision of the steps from frame to frame, of shape (T - 1, R); None: nothing stands."""
 
     def __call__(self, at: Array) -> float:
         """The cost of markers (T, R)."""
-        return float((self.precision * (at - self.measured) ** 2).sum() + (self.jerk(at) ** 2 / self.variance).sum())
+        slid = 0.0 if self.still is None else (self.still * np.diff(at, axis=0) ** 2).sum()
+        return float((self.precision * (at - self.measured) ** 2).sum() + (self.jerk(at) ** 2 / self.variance).sum() + slid)
 
     def jerk(self, at: Array) -> Array:
         """Third differences (T - 3, R) of markers (T, R)."""
@@ -53,6 +57,10 @@ class PathCost(NamedTuple):
         out, jerk = self.precision * (self.measured - at), self.jerk(at) / self.variance
         for k in range(4):
             out[k : len(at) - 3 + k] -= self.third[:, k, None] * jerk
+        if self.still is not None:
+            slid = self.still * np.diff(at, axis=0)
+            out[:-1] += slid
+            out[1:] -= slid
         return out
 
     def curvature(self, apart: int) -> Array:
@@ -60,6 +68,11 @@ class PathCost(NamedTuple):
         out = self.precision.copy() if apart == 0 else np.zeros((len(self.measured) - apart, self.measured.shape[1]))
         for k in range(4 - apart):
             out[k : k + len(self.third)] += (self.third[:, k] * self.third[:, k + apart])[:, None] / self.variance
+        if self.still is not None and apart == 0:
+            out[:-1] += self.still
+            out[1:] += self.still
+        elif self.still is not None and apart == 1:
+            out -= self.still
         return out
 
 

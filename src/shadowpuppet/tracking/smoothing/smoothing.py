@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
+from shadowpuppet.motion.contact.contact import contacts_of
 from shadowpuppet.motion.interpolation import filled, true_runs
 from shadowpuppet.motion.motion import PER_FRAME, Motion
 from shadowpuppet.tracking.smoothing.butterworth import PASSES, filtered
@@ -20,6 +21,7 @@ from shadowpuppet.tracking.smoothing.gaps import bridged, stray
 from shadowpuppet.tracking.smoothing.method import Method
 from shadowpuppet.tracking.smoothing.pose_path import STEPS, PathCost, likeliest_poses
 from shadowpuppet.tracking.smoothing.projection import Markers, Points, markers, nearest_poses
+from shadowpuppet.tracking.smoothing.standing import Standing, standing
 
 BLOCK, OVERLAP = 1500, 4.0
 """Frames of a block, and the time (s) by which it is continued at both ends, after which a frame has no influence."""
@@ -79,10 +81,11 @@ class MotionSmoother:
         motion, mirrored, wrong = self._faced(motion, leans)
         inside = bridged(motion.times, motion.joints, self.gaps)
         poses, known = motion.poses.copy(), motion.known
-        free = np.asarray((poses[known] != poses[known][:1]).any(0))
+        free, contacts = np.asarray((poses[known] != poses[known][:1]).any(0)), contacts_of(motion.table)
+        floor = None if contacts is None else contacts.floor
         for begin, end in true_runs(known | inside):
             for block, kept in _blocks(motion.times, begin, end):
-                poses[kept] = self._poses(motion[block], free)[kept.start - block.start : kept.stop - block.start]
+                poses[kept] = self._poses(motion[block], free, floor)[kept.start - block.start : kept.stop - block.start]
         return SmoothedMotion(self._motion(motion, poses, inside), inside, mirrored, wrong)
 
     @property
@@ -102,8 +105,8 @@ class MotionSmoother:
         joints[changed] = self.points(turned.motion.poses[changed])
         return turned._replace(motion=replace(turned.motion, joints=joints))
 
-    def _poses(self, motion: Motion, free: NDArray[np.bool_]) -> Array:
-        """Poses (T, D) of a run of frames in which no gap is left."""
+    def _poses(self, motion: Motion, free: NDArray[np.bool_], floor: float | None) -> Array:
+        """Poses (T, D) of a run of frames in which no gap is left; `floor`: its height (m), if something stands on it."""
         start = np.clip(filled(motion.times, _unwrapped(self.skeleton, motion.poses)), *self._wide(motion.poses))
         raw = markers(self.skeleton, self.points, start)
         unknown, number = ~motion.known, motion.joints.shape[1]
@@ -114,7 +117,10 @@ class MotionSmoother:
         sd = self._marker_sd(motion.pose_sd, motion.joint_sd)
         found = smooth(motion.times, both, sd, self._least(number))
         near = self._nearest(start, found.points, number, free)
-        return near if len(motion) <= ORDER else self._path(near, filled(motion.times, both), found, motion.times, free)
+        if len(motion) <= ORDER:
+            return near
+        stands = None if floor is None else standing(motion.times, motion.joint_names, found.points, floor)
+        return self._path(near, filled(motion.times, both), found, motion.times, free, stands=stands)
 
     def likeliest(self, tracked: Tracked, start: Array, free: NDArray[np.bool_], given: int, given_sd: float, rounds: int,
                   steps: int) -> Array:
@@ -129,12 +135,17 @@ class MotionSmoother:
         found = smooth(tracked.times, measured, sd, self._least(tracked.joint_sd.shape[1]), rounds)
         return self._path(_unwrapped(self.skeleton, start), measured, found, tracked.times, free, steps)
 
-    def _path(self, start: Array, measured: Array, found: Smoothed, times: Array, free: NDArray[np.bool_], steps: int = STEPS) -> Array:
-        """The likeliest poses (T, D) from `start` on, given measured markers (T, M, 3), and what they weigh by `found`."""
+    def _path(self, start: Array, measured: Array, found: Smoothed, times: Array, free: NDArray[np.bool_], steps: int = STEPS,
+              stands: Standing | None = None) -> Array:
+        """The likeliest poses (T, D) from `start` on, given measured markers (T, M, 3), what they weigh by `found`, and what stands."""
         number = measured.shape[1] - 3 * len(self.skeleton.joints)
         share = np.repeat([1.0, AXES_SHARE], [number, measured.shape[1] - number])
-        cost = PathCost(_in_a_row(measured), _in_a_row(found.precision * share[:, None]), differences(times),
-                        np.repeat(found.variances / share, 3, axis=1))
+        precision, still = found.precision * share[:, None], None
+        if stands is not None:
+            both = precision + stands.level
+            measured, precision = (precision * measured + stands.level * stands.floor) / both, both
+            still = _in_a_row(stands.still)
+        cost = PathCost(_in_a_row(measured), _in_a_row(precision), differences(times), np.repeat(found.variances / share, 3, axis=1), still)
         return likeliest_poses(self.skeleton, self.points, start, cost, free, steps)
 
     def _marker_sd(self, pose_sd: Array, joint_sd: Array) -> Array:

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
-from shadowpuppet.io.calibration.calibration_files import find_calibration, is_calibration
+from shadowpuppet.io.calibration.formats import find_calibration, is_calibration
 from shadowpuppet.io.motion import READABLE
 from shadowpuppet.io.prior import FORMAT
+from shadowpuppet.io.recording import is_recording
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.viewer.scene.of_file import calibration_scene, motion_scene
 from shadowpuppet.viewer.scene.of_prior import prior_scene
@@ -63,7 +64,7 @@ def cut_scene(scene: Scene, start: float | None, end: float | None) -> Scene:
 
 
 def _of_folder(path: Path, options: Options) -> Scene:
-    made = any((path / name).exists() for name in ("video", "recording.toml"))
+    made = is_recording(path)
     if not made and is_calibration(path):
         return calibration_scene(path)
     if not made and (found := find_calibration(path)) is not None:

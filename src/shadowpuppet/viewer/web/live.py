@@ -25,7 +25,7 @@ from shadowpuppet.viewer.web.server import address_of, close_server, open_server
 
 MOST_A_SECOND = 10.0
 """Greatest number of views drawn per second; more would slow the tracker."""
-BUTTONS = {"Stop": "stop", "Learn the background anew": "learn", "Measure the person anew": "measure"}
+BUTTONS = {"Stop": "stop", "Learn the background again": "learn", "Measure the person again": "measure"}
 WIDE, QUALITY = 320, 80
 """Width of the picture, pixels, and its JPEG quality."""
 

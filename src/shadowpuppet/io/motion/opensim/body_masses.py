@@ -8,10 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.body.anthropometry import stature_of
-from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.opensim.coordinates import SIDES
-from shadowpuppet.io.motion.opensim.feet import foot_points
 from shadowpuppet.motion.animation import Animation
 
 BODY_MASS_INDEX = 23.0
@@ -69,10 +67,10 @@ class Mass(NamedTuple):
     """About the centre, same axes, (3, 3), kg m2."""
 
 
-def body_masses(body: Body, animation: Animation, moving: Mapping[str, str], weight: float) -> dict[str, Mass]:
+def body_masses(animation: Animation, moving: Mapping[str, str], weight: float) -> dict[str, Mass]:
     """Masses of the rigid bodies of a whole body of a weight (kg). `moving`: for each joint, the joint whose body it belongs to, itself
     or one above. Segments that end at points that the skeleton lacks get what it has: a body without feet carries theirs at the ankles."""
-    places = _places(body, animation)
+    places = _places(animation)
     parts: dict[str, list[tuple[float, Array, Array]]] = {}
     for segment in SEGMENTS:
         owner = moving.get(segment.joint, "pelvis")
@@ -83,17 +81,13 @@ def body_masses(body: Body, animation: Animation, moving: Mapping[str, str], wei
     return {owner: _together(own) for owner, own in parts.items()}
 
 
-def _places(body: Body, animation: Animation) -> dict[str, Array]:
+def _places(animation: Animation) -> dict[str, Array]:
     """Points of a skeleton at rest (left, up, forward), metres, relative to the pelvis, by name."""
     places = dict(zip(animation.names, animation.rest))
     end = np.array(animation.ends.get(animation.names.index("head"), (0.0, 0.0, 0.0)))
     places["crown"] = places["head"] + end
     places.setdefault("chest", 0.5 * places["neck"])
     places["waist"] = (places["chest"] + places["neck"]) / 2
-    for side in SIDES:
-        foot = foot_points(body, f"{side}_ankle")
-        if foot is not None:
-            places[f"{side}_heel"], places[f"{side}_toe"] = places[f"{side}_ankle"] + foot
     return places
 
 

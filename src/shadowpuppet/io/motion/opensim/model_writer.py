@@ -18,7 +18,6 @@ from shadowpuppet.geometry import euler_angles
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.opensim.body_masses import Mass, average_weight, body_masses
 from shadowpuppet.io.motion.opensim.coordinates import MODELS, PELVIS_POSITION, SIDES, TO_MODEL, Ball, Hinge, Part
-from shadowpuppet.io.motion.opensim.feet import FEET, foot_points
 from shadowpuppet.io.motion.opensim.markers import MARKERS
 from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.body_animation import TO_REST
@@ -53,7 +52,7 @@ def write_osim(path: str | Path, body: Body, animation: Animation, weight: float
         if part.joint in animation.names and _moves(body, part.joint):
             parts.setdefault(part.joint, []).append(part)
     owners = _owners(animation, set(parts))
-    masses = body_masses(body, animation, owners, average_weight(animation) if weight is None else weight)
+    masses = body_masses(animation, owners, average_weight(animation) if weight is None else weight)
     root = Element("OpenSimDocument", Version=VERSION)
     model = SubElement(root, "Model", name=path.stem)
     _text(model, "credits", "shadowpuppet; masses by de Leva (1996)")
@@ -67,10 +66,6 @@ def write_osim(path: str | Path, body: Body, animation: Animation, weight: float
         _joint(joints, joint, parts[joint], owners, animation, body)
     for n, name in enumerate(animation.names):
         _marker(markers, MARKERS.get(name, name), owners[name], animation.rest[n] - animation.rest[animation.names.index(owners[name])])
-    for ankle, names in FEET.items():
-        foot = foot_points(body, ankle)
-        for name, place in zip(names, [] if foot is None else foot):
-            _marker(markers, MARKERS[name], ankle, place)
     indent(root, "\t")
     write_whole(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, "unicode")}\n')
 

@@ -18,8 +18,8 @@ from shadowpuppet.cli.app import run
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.pipeline.check_calibration import check_calibration
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.repair.films import check_calibration
 from shadowpuppet.pipeline.rig import open_rig
 
 FRAMES = 70
@@ -55,13 +55,13 @@ def test_frames_by_which_films_are_late(cameras, masks, late):
     assert found.pairs[1][0] == pytest.approx(late[0] - late[1], abs=0.15)
 
 
-def test_half_frames_are_told(cameras):
+def test_half_frames_are_reported(cameras):
     masks = made_rig.masks(cameras, 120)
     rows = [[masks[20 + 2 * f - (3 if k == 1 else 0)][k] for k in range(4)] for f in range(45)]  # every second: 1.5 sets
     np.testing.assert_allclose(time_offsets(cameras, silhouettes(rows)).frames, (0, 1.5, 0, 0), atol=0.25)
 
 
-def test_two_cameras_are_told_apart_only(cameras, masks):
+def test_two_cameras_are_distinguished_only(cameras, masks):
     found = time_offsets(cameras[:2], silhouettes([row[:2] for row in shifted(masks, (0, 4, 0, 0))]))
     assert found.frames[0] == 0
     assert found.frames[1] == pytest.approx(4, abs=0.15)
@@ -72,7 +72,7 @@ def test_a_camera_that_was_moved_a_little_is_not_late(cameras, masks):
     np.testing.assert_allclose(time_offsets(wrong, silhouettes(shifted(masks, (0, 3, 0, 0)))).frames, (0, 3, 0, 0), atol=0.6)
 
 
-def test_somebody_who_stands_still_tells_nothing(cameras, masks):
+def test_a_person_who_stands_still_tells_nothing(cameras, masks):
     still = silhouettes([masks[0]] * 50)
     assert time_offsets(cameras, still).frames == (None,) * 4
     assert time_offsets(cameras, still[:10]).frames == (None,) * 4
@@ -131,7 +131,7 @@ def test_a_camera_that_was_turned_is_named_with_its_turn(again, cameras):
     assert found.late == ()
 
 
-def test_a_late_film_is_told_with_what_mends_it(tmp_path, cameras, masks):
+def test_a_late_film_is_reported_with_what_mends_it(tmp_path, cameras, masks):
     folder = made_rig.write(tmp_path / "r", cameras, shifted(masks, (0, 0, 4, 0)))
     found = checked(folder)
     assert found.late == ("cam3",)
@@ -157,7 +157,7 @@ def test_a_camera_that_was_carried_off_is_named_and_not_late(again, cameras):
     assert any("camera 'cam3' disagrees" in doubt for doubt in found.doubts)
 
 
-def test_swapped_films_are_told_and_no_time_is(recording, again, cameras):
+def test_swapped_films_are_reported_and_no_time_is(recording, again, cameras):
     swapped = [replace(cameras[1], name="cam1"), replace(cameras[0], name="cam2"), *cameras[2:]]
     found = checked(again(swapped))
     assert "'cam1' and 'cam2' are swapped" in found.doubts[0]

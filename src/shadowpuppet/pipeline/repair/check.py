@@ -13,6 +13,7 @@ import numpy as np
 from shadowpuppet.calibration.agreement import MAX_DISAGREEMENT, Agreement, compare_cameras
 from shadowpuppet.calibration.rotation_error import RotationError, estimate_rotation_error
 from shadowpuppet.calibration.silhouettes import Row, silhouettes_of
+from shadowpuppet.calibration.sound_offset import SoundOffsets
 from shadowpuppet.calibration.time_offset import TimeOffsets, time_offsets
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
 from shadowpuppet.pipeline.footage import Footage, take_sample
@@ -20,7 +21,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, uncluttered_silhouettes
-from shadowpuppet.pipeline.survey import brief_length
+from shadowpuppet.pipeline.survey.film import brief_length
 from shadowpuppet.threads import usable_cores
 
 SETS, MIN_SETS, MAX_SETS_READ = 240, 120, 3000
@@ -70,6 +71,10 @@ class CalibrationCheck:
     """Values for [start] of recording.toml, seconds; empty if no film is late."""
     turns: dict[str, RotationFix]
     """Rotations that explain the disagreement of cameras, by camera name."""
+    sound: SoundOffsets | None = None
+    """Offsets of the films by their sound; None if fewer than two have sound."""
+    by_sound: bool = False
+    """Whether the films were put in step by their sound before silhouettes were compared."""
     doubts: tuple[str, ...] = ()
     """Problems with their remedies, a sentence each."""
 
@@ -91,21 +96,6 @@ class SilhouetteSets(NamedTuple):
     """Silhouettes by set, then by camera."""
     every: int
     """Number of film frames from one set to the next."""
-
-
-def check_calibration(rig: Rig, options: Options, listener: Listener | None = None) -> CalibrationCheck:
-    """Test the calibration of several cameras. Raises a `ShadowPuppetError` if there are no silhouettes, or no person in them."""
-    return check_sets(rig, options, listener)[0]
-
-
-def check_sets(rig: Rig, options: Options, listener: Listener | None = None) -> tuple[CalibrationCheck, SilhouetteSets]:
-    """As `check_calibration`; also returns the silhouettes compared."""
-    if not rig.is_multiview:
-        raise RecordingError(f"{rig.recording.path}: found one camera, expected two or more")
-    listener = listener or Listener()
-    sets = gather_silhouettes(rig, options, listener)
-    listener.begin("comparing")
-    return judge_calibration(rig, sets), sets
 
 
 def gather_silhouettes(rig: Rig, options: Options, listener: Listener) -> SilhouetteSets:
@@ -143,7 +133,7 @@ def judge_calibration(rig: Rig, sets: SilhouetteSets) -> CalibrationCheck:
         agreement=found.agreement, lateness=offsets, turns=found.rotations, starts=_starts(rig, found.shifts, sets.every),
         late=tuple(name for name, shift in zip(rig.names, found.shifts) if shift),
     )  # fmt: skip
-    return replace(check, doubts=tuple(_doubts(check)))
+    return replace(check, doubts=tuple(doubts_of(check)))
 
 
 class _Judgement(NamedTuple):
@@ -237,7 +227,8 @@ def _starts(rig: Rig, shifts: Sequence[float], every: int) -> dict[str, float]:
     return {name: round(start, 4) for name, start in starts.items() if start > 1e-4}
 
 
-def _doubts(check: CalibrationCheck) -> list[str]:
+def doubts_of(check: CalibrationCheck) -> list[str]:
+    """What is wrong, with its remedy, a sentence each."""
     said, found = list[str](), check.agreement
     if check.late and check.lateness is not None:
         frames = {name: value for name, value in zip(check.lateness.names, check.lateness.frames) if name in check.late}

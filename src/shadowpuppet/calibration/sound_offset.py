@@ -1,0 +1,146 @@
+"""Time offsets between films from their sound: a clap, steps, voices and the room's noise are heard by all microphones.
+
+What two microphones share are onsets: moments at which the sound of a band of frequencies grows. The shift at which the onsets of two films
+are most alike is their offset. Levels, distance and echoes change an onset's strength more than its moment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
+from scipy.signal import ShortTimeFFT, windows
+
+from shadowpuppet.geometry import Array
+
+RATE = 8000
+"""Samples/s that suffice."""
+WINDOW, HOP = 128, 20
+"""Samples of a spectrum, 16 ms, and from one to the next, 2.5 ms."""
+EDGE = WINDOW // HOP + 2
+"""Spectra at either end that are in part before the beginning or after the end."""
+BANDS = ((100, 300), (300, 600), (600, 1000), (1000, 1500), (1500, 2200), (2200, 3000), (3000, 3900))
+"""Limits of the bands, Hz."""
+LOUDEST = 25.0
+"""Onsets over this number of standard deviations count as much as that: one bang does not decide alone. With a lower limit a clap's echoes
+would count as much as the clap."""
+MIN_OVERLAP = 2.0
+"""Least time, seconds, that two films have in common."""
+LEAST_SCORE, LEAST_RATIO, RIVAL = 9.0, 1.6, 0.1
+"""The best shift's likeness must exceed the median of all by this number of robust standard deviations, and by this ratio that of the
+best shift farther away than `RIVAL` seconds: steps and music repeat themselves."""
+SPEED_OF_SOUND = 343.0
+QUANTILE = 1.645
+"""Half-width of a 90 % interval over the standard deviation."""
+PRECISION = 0.002
+"""Standard deviation of an offset without echoes, seconds."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SoundOffsets:
+    """Time offsets of films by their sound; plain values."""
+
+    names: tuple[str, ...]
+    """Names of the cameras."""
+    seconds: tuple[float | None, ...]
+    """By which each film is late (negative: early): what is heard comes that much later on its clock than on most others'; None if nothing
+    stands out."""
+    spread: tuple[float | None, ...]
+    """Half-width of the 90 % interval, seconds: the sound's way to the cameras, and how the pairs differ."""
+
+
+def sound_offsets(names: Sequence[str], sounds: Sequence[Array | NDArray[np.float32] | None], begins: Sequence[float],
+                  centres: Array) -> SoundOffsets:
+    """Offsets of films from their sound.
+
+    Args:
+        names: of the cameras.
+        sounds: samples (N,) at `RATE`; None for films without sound.
+        begins: time of each film's first sample on the clock of its pictures, seconds.
+        centres: places of the cameras, (C, 3), metres; microphones are taken to be there.
+    """
+    onsets = [None if sound is None else onset_strengths(sound) for sound in sounds]
+    pairs = []
+    for i, j in combinations(range(len(names)), 2):
+        first, second = onsets[i], onsets[j]
+        shift = None if first is None or second is None else best_shift(first, second)
+        if shift is not None:
+            way = float(np.linalg.norm(centres[i] - centres[j])) / SPEED_OF_SOUND
+            pairs.append((i, j, shift + begins[j] - begins[i], way))
+    seconds, spread = _solved(len(names), pairs)
+    return SoundOffsets(names=tuple(names), seconds=seconds, spread=spread)
+
+
+def onset_strengths(samples: Array | NDArray[np.float32]) -> Array:
+    """Growth of the sound in each band, (B, F), a column every `HOP` samples: zero mean, standard deviation one, cut at `LOUDEST`."""
+    spectrum = ShortTimeFFT(windows.hann(WINDOW), HOP, RATE)
+    power = np.abs(spectrum.stft(np.asarray(samples, float), p0=0, p1=max(1, len(samples) // HOP))) ** 2
+    bands = np.array([power[(spectrum.f >= low) & (spectrum.f < high)].sum(0) for low, high in BANDS])
+    levels = np.log(bands + 1e-3 * bands.mean(1, keepdims=True) + 1e-12)
+    growth = np.maximum(np.diff(levels, axis=1, prepend=levels[:, :1]), 0)
+    growth[:, :EDGE] = growth[:, -EDGE:] = 0  # where a recording begins and ends is no onset
+    growth -= growth.mean(1, keepdims=True)
+    deviation = growth.std(1, keepdims=True)
+    return np.minimum(growth / np.where(deviation > 1e-9, deviation, np.inf), LOUDEST)
+
+
+def best_shift(first: Array, second: Array) -> float | None:
+    """Seconds by which the onsets (B, F) come later in the second sound; None if no shift stands out."""
+    n, m = first.shape[1], second.shape[1]
+    size = next_fast_len(n + m)
+    likeness = np.fft.irfft((np.conj(np.fft.rfft(first, size)) * np.fft.rfft(second, size)).sum(0), size)
+    lags = np.concatenate([np.arange(m), np.arange(-n + 1, 0)])  # second[k + lag] beside first[k]
+    likeness = np.concatenate([likeness[:m], likeness[size - n + 1 :]])
+    common = np.minimum(n, m - lags) - np.maximum(0, -lags)
+    enough = common * HOP >= MIN_OVERLAP * RATE
+    if enough.sum() < 100:
+        return None
+    lags, likeness = lags[enough], likeness[enough] / np.sqrt(common[enough])
+    order = np.argsort(lags)
+    lags, likeness = lags[order], likeness[order]
+    middle = float(np.median(likeness))
+    deviation = 1.4826 * float(np.median(np.abs(likeness - middle)))
+    best = int(np.argmax(likeness))
+    rivals = likeness[np.abs(lags - lags[best]) * HOP > RIVAL * RATE]
+    height = likeness[best] - middle
+    if deviation <= 0 or height < LEAST_SCORE * deviation or (len(rivals) and height < LEAST_RATIO * (rivals.max() - middle)):
+        return None
+    return float(lags[best] + _summit(likeness, best)) * HOP / RATE
+
+
+def _summit(values: Array, k: int) -> float:
+    """Place of the parabola's summit through a greatest value and its neighbours, from that value."""
+    if not 0 < k < len(values) - 1:
+        return 0.0
+    before, at, after = values[k - 1 : k + 2]
+    bend = before - 2 * at + after
+    return float(0.5 * (before - after) / bend) if bend < 0 else 0.0
+
+
+def _solved(count: int, pairs: Sequence[tuple[int, int, float, float]]) -> tuple[tuple[float | None, ...], tuple[float | None, ...]]:
+    """Offsets with a median of zero from those of pairs (first, second, seconds, the sound's way in seconds), and their half-widths."""
+    heard = sorted({camera for i, j, *_ in pairs for camera in (i, j)})
+    if not heard:
+        return (None,) * count, (None,) * count
+    rows, target = np.zeros((len(pairs), count)), np.array([shift for _, _, shift, _ in pairs])
+    for n, (i, j, *_) in enumerate(pairs):
+        rows[n, i], rows[n, j] = -1, 1
+    weights = np.ones(len(pairs))
+    late = np.zeros(count)
+    for _ in range(20):  # iteratively reweighted least squares: the sum of absolute residuals
+        late = np.linalg.lstsq(rows * weights[:, None], target * weights, rcond=None)[0]
+        weights = 1 / np.sqrt(np.maximum(np.abs(rows @ late - target), PRECISION))
+    late -= np.median(late[heard])
+    off = np.abs(rows @ late - target)
+    seconds: list[float | None] = [None] * count
+    spread: list[float | None] = [None] * count
+    for camera in heard:
+        own = [n for n, (i, j, *_) in enumerate(pairs) if camera in (i, j)]
+        way = float(np.median([pairs[n][3] for n in own])) / np.sqrt(3)  # the sound comes from anywhere between the two
+        seconds[camera] = round(float(late[camera]), 4)
+        spread[camera] = round(QUANTILE * float(np.sqrt(PRECISION**2 + way**2 + np.median(off[own]) ** 2)), 4)
+    return tuple(seconds), tuple(spread)

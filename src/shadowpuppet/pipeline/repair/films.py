@@ -1,0 +1,103 @@
+"""Checks a recording: its calibration by silhouettes, and whether its films are in step by silhouettes and by sound."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.calibration.sound_offset import SoundOffsets
+from shadowpuppet.calibration.time_offset import TimeOffsets
+from shadowpuppet.errors import RecordingError
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.repair.check import (
+    MIN_OFFSET,
+    SPREAD_FACTOR,
+    CalibrationCheck,
+    SilhouetteSets,
+    doubts_of,
+    gather_silhouettes,
+    judge_calibration,
+)
+from shadowpuppet.pipeline.repair.sound import heard_offsets, in_step
+from shadowpuppet.pipeline.rig import Rig
+
+SAME_PIXELS = 0.1
+"""Mean disagreement by which films put in step by sound may be worse if the person hardly moves, so that silhouettes cannot tell."""
+
+
+def check_calibration(rig: Rig, options: Options, listener: Listener | None = None) -> CalibrationCheck:
+    """Test the calibration of several cameras, and whether their films are in step, by silhouettes and by sound.
+
+    Raises a `ShadowPuppetError` if there are no silhouettes, or no person in them.
+    """
+    return check_films(rig, options, listener).check
+
+
+class Checked(NamedTuple):
+    """A check with the silhouettes that it rests on."""
+
+    check: CalibrationCheck
+    sets: SilhouetteSets
+    """As the films were compared: put in step by their sound if `check.by_sound`."""
+    before: SilhouetteSets
+    """As the recording states the films' starts."""
+
+
+def check_films(rig: Rig, options: Options, listener: Listener | None = None) -> Checked:
+    """As `check_calibration`; also returns the silhouettes compared."""
+    if not rig.is_multiview:
+        raise RecordingError(f"{rig.recording.path}: found one camera, expected two or more")
+    listener = listener or Listener()
+    sets = gather_silhouettes(rig, options, listener)
+    listener.begin("listening")
+    heard = heard_offsets(rig)
+    listener.begin("comparing")
+    check = replace(judge_calibration(rig, sets), sound=heard)
+    if heard is None or not _differs(heard, check):
+        return Checked(check, sets, sets)
+    moved = in_step(rig, heard)
+    again = gather_silhouettes(moved, options, listener)
+    listener.begin("comparing")
+    other = judge_calibration(moved, again)
+    if _mean_disagreement(other) > _mean_disagreement(check) + (SAME_PIXELS if check.still else 0.0):
+        said = "sound and silhouettes disagree about the films' delays: does the sound of a film lag behind its pictures?"
+        return Checked(replace(check, doubts=(*check.doubts, said)), sets, sets)
+    return Checked(_by_sound(rig, moved, other, heard), again, sets)
+
+
+def _differs(heard: SoundOffsets, check: CalibrationCheck) -> bool:
+    """Whether sound states an offset that the silhouettes do not."""
+    seen = (None,) * len(heard.names) if check.lateness is None else check.lateness.frames
+    certain = [0.0 if late is None or name not in check.late else late for name, late in zip(check.agreement.names, seen)]
+    return any(seconds is not None and spread is not None
+               and abs(seconds * check.frame_rate - late) > max(1.0, SPREAD_FACTOR * spread * check.frame_rate)
+               for seconds, spread, late in zip(heard.seconds, heard.spread, certain))
+
+
+def _mean_disagreement(check: CalibrationCheck) -> float:
+    """Pixels, over the cameras."""
+    known = [apart for apart in check.agreement.apart if apart is not None]
+    return float(np.mean(known)) if known else np.inf
+
+
+def _by_sound(rig: Rig, moved: Rig, check: CalibrationCheck, heard: SoundOffsets) -> CalibrationCheck:
+    """The check of films that sound put in step, with delays against the starts that the recording states."""
+    names, rate = rig.names, rig.rate
+    late = [(value or 0.0) * rate for value in heard.seconds]
+    seen = [None] * len(names) if check.lateness is None else [frames if name in check.late else None
+                                                               for name, frames in zip(names, check.lateness.frames)]
+    spreads = [None] * len(names) if check.lateness is None else check.lateness.spread
+    frames = tuple(round(own + (known or 0.0), 2) for own, known in zip(late, seen))
+    spread = tuple((None if width is None else round(width * rate, 2)) if known is None else of_seen
+                   for known, of_seen, width in zip(seen, spreads, heard.spread))
+    starts = {footage.camera.name: footage.view.start + (known or 0.0) / rate for footage, known in zip(moved.footage, seen)}
+    least = min(starts.values())
+    found = TimeOffsets(names=names, frames=frames, spread=spread,
+                        pairs=tuple((None,) * len(names) for _ in names) if check.lateness is None else check.lateness.pairs)
+    check = replace(check, lateness=found, sound=heard, by_sound=True,
+                    late=tuple(name for name, value in zip(names, frames) if abs(value) > MIN_OFFSET),
+                    starts={name: round(start - least, 4) for name, start in starts.items() if start - least > 1e-4})
+    return replace(check, doubts=tuple(doubts_of(check)))

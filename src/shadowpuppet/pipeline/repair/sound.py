@@ -1,0 +1,53 @@
+"""Listens to a recording's films, and puts them in step by what is heard."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shadowpuppet.calibration.sound_offset import RATE, SoundOffsets, sound_offsets
+from shadowpuppet.errors import VideoError
+from shadowpuppet.pipeline.footage import Footage
+from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.threads import usable_cores
+from shadowpuppet.video.sound import Sound, read_sound
+
+LONGEST = 300.0
+"""Seconds of a film that are listened to."""
+
+
+def heard_offsets(rig: Rig) -> SoundOffsets | None:
+    """Offsets of the films by their sound, beside the starts that the recording states; None if fewer than two have sound."""
+    with ThreadPoolExecutor(usable_cores(), "sound") as pool:
+        sounds = list(pool.map(_sound_of, rig.footage))
+    if sum(sound is not None for sound in sounds) < 2:
+        return None
+    begins = [0.0 if sound is None else sound.begin - footage.view.start for sound, footage in zip(sounds, rig.footage)]
+    return sound_offsets(rig.names, [None if sound is None else sound.samples for sound in sounds], begins,
+                         np.array([camera.centre for camera in rig.cameras]))
+
+
+def _sound_of(footage: Footage) -> Sound | None:
+    """A film's sound; None for folders of pictures, live cameras, and films whose frames are timed by the recording's `rate`."""
+    film = footage.view.video
+    if not isinstance(film, Path) or not film.is_file() or footage.recording.rate is not None:
+        return None
+    try:
+        return read_sound(film, RATE, LONGEST)
+    except VideoError:
+        return None  # a picture, or a film that the look reports
+
+
+def in_step(rig: Rig, heard: SoundOffsets) -> Rig:
+    """The rig with each film's start moved by what is heard; no start becomes negative."""
+    late = [value or 0.0 for value in heard.seconds]
+    starts = [footage.view.start + value for footage, value in zip(rig.footage, late)]
+    least = min(0.0, *starts)
+    moved = {footage.camera.name: start - least for footage, start in zip(rig.footage, starts)}
+    views = tuple(replace(view, start=moved.get(view.camera.name, view.start)) for view in rig.recording.views)
+    recording = replace(rig.recording, views=views)
+    return Rig(recording, tuple(replace(footage, recording=recording, view=replace(footage.view, start=moved[footage.camera.name]))
+                                for footage in rig.footage))

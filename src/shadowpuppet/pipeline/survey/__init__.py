@@ -1,0 +1,1 @@
+"""A recording examined before a run."""

@@ -1,0 +1,116 @@
+"""Examines a recording of one camera before a run: silhouettes, first seconds, and doubts about the run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import chain, islice
+
+import numpy as np
+
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.errors import HARMFUL, NOTED, Caution
+from shadowpuppet.pipeline.footage import FIRST, CameraFrame, Footage, Sample
+from shadowpuppet.pipeline.look import FirstSeconds, Look, Survey
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.people.census import count_in_picture
+from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes
+from shadowpuppet.pipeline.survey.cautions import (
+    GOOD,
+    clutter_cautions,
+    condition_cautions,
+    recovery_cautions,
+    recovery_doubt,
+    unlike_ready,
+)
+from shadowpuppet.pipeline.survey.film import FilmSurvey, mean_overlap, survey_film
+from shadowpuppet.silhouette.added import SceneHint
+
+SHORT = 1.0
+"""Length of a film, seconds, under which it is said to be short."""
+UNEVEN = 0.1
+"""Jitter over the frame interval above which the film's rate counts as variable."""
+
+
+def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (SceneHint(),)) -> Survey:
+    """Examine a recording of one camera; `hints` as in `survey_film`. Raises a `ShadowPuppetError` if something cannot be used."""
+    footage = rig.footage[0]
+    film = survey_film(footage, options, hint=hints[0])
+    look = _look(footage, film)
+    if look.refusal and not options.anyway:
+        return Survey(rig, (film.silhouettes,), (film.silhouettes,), FirstSeconds([], []), look)
+    clean = clean_silhouettes(footage, film.sample, film.silhouettes, options)
+    return Survey(rig, (film.silhouettes,), (clean,), _first_people(film.sample, clean), look)
+
+
+def _first_people(sample: Sample, clean: Silhouettes) -> FirstSeconds:
+    """The first `FIRST` silhouettes that may be a person's: of the first seconds, then of the frames sampled from the whole film; and
+    silhouettes spread over the whole film, of the first frame of each of the sample's runs but the first."""
+    def seen(frame: CameraFrame) -> tuple[float, Mask]:
+        return frame.time, clean(frame)
+
+    people = list(islice((each for each in map(seen, chain(sample.first, sample.frames)) if may_be_person(each[1])), FIRST))
+    spread = [each for each in (seen(run[0]) for run in sample.runs[1:]) if may_be_person(each[1])]
+    return FirstSeconds([time for time, _ in people], [(mask,) for _, mask in people], tuple((mask,) for _, mask in spread))
+
+
+def _look(footage: Footage, film: FilmSurvey) -> Look:
+    sample, camera = film.sample, footage.camera
+    plain = [mask for frame in sample.frames if (mask := film.silhouettes.plain(frame)) is not None]
+    look = Look(
+        recording=str(footage.recording.path), camera=camera.name, calibrated=camera.oriented, frames=footage.count,
+        looked_at=len(sample.times), rate=1 / sample.pace, jitter=sample.jitter, scale=known_scale(footage), area=_share(film.masks),
+        plain_area=_share(plain) if plain else None, exact_overlap_plain=mean_overlap(plain, film.exact),
+        refusal=recovery_doubt(film.silhouettes) or film.values["quality"].refusal(), **film.values,
+    )  # fmt: skip
+    if look.refusal:
+        return look
+    doubts = (*_several_people(film), *_doubts(look, footage),
+              *recovery_cautions([camera.name], [film.silhouettes]), *clutter_cautions(look.left_out))
+    return replace(look, doubts=(*doubts, *look.quality.warnings()))
+
+
+def _several_people(film: FilmSurvey) -> list[Caution]:
+    number = count_in_picture(film.sample, film.silhouettes)
+    if number < 2:
+        return []
+    return [Caution(f"{number} people are in the picture: one camera tracks one, the nearest, who is the largest in the picture; two "
+                    "calibrated cameras or more track all", f"{number} people; the nearer one is tracked", HARMFUL)]
+
+
+def known_scale(footage: Footage) -> str:
+    """Known lengths that fix the scale, in words."""
+    subject = footage.recording.subject
+    known = [f"{name} {value:.2f} m" for name, value in (("height", subject.height), ("distance", subject.distance)) if value]
+    return " and ".join(known) or f"average height of {AVERAGE_HEIGHT:.2f} m, assumed"
+
+
+def _doubts(look: Look, footage: Footage) -> list[Caution]:
+    doubts, subject = list[Caution](), footage.recording.subject
+    if not look.calibrated:
+        doubts.append(Caution(f"no calibration: the camera is taken for level, with a field of view of {look.fov:.0f} degrees and no "
+                              "distortion; depths and the world's axes are as good as that; give a calibration.toml",
+                              "camera not calibrated: depths are rough; give --calibration", NOTED))
+    if subject.height is None and subject.distance is None:
+        doubts.append(Caution(f"neither height nor distance is known: the {look.scale}, and all lengths are as wrong as that is; give "
+                              "--height", "height not known, so no length is: give --height", HARMFUL))
+    elif subject.distance is None and not footage.recording.references:
+        doubts.append(Caution("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as "
+                              "wrong as that; measure it and give --distance, or take references",
+                              "distance not known: measure it, give --distance", NOTED))
+    if look.frames is not None and look.frames < SHORT * look.rate:
+        seconds = f"{look.frames / look.rate:.1f} s"
+        doubts.append(Caution(f"the film has only {look.frames} frames ({seconds}): too few to measure the person well and to smooth the "
+                              "motion; film some seconds", f"film of {seconds} is very short: film some seconds", HARMFUL))
+    if look.jitter * look.rate > UNEVEN:
+        doubts.append(Caution(f"the time from frame to frame varies by {100 * look.jitter * look.rate:.0f} %: the film's own times are "
+                              "kept", "frames come unevenly: their own times are kept", NOTED))
+    if look.exact_overlap is not None and look.exact_overlap < GOOD:
+        doubts.append(unlike_ready(look.exact_overlap))
+    return [*doubts, *condition_cautions(look.condition)]
+
+
+def _share(masks: Sequence[Mask]) -> float:
+    return float(np.mean([mask.mean() for mask in masks]))

@@ -1,0 +1,114 @@
+"""Examines a recording of several cameras before a run: each film, the first seconds of all together, do they agree, how many people."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+
+from shadowpuppet.calibration.agreement import agreement
+from shadowpuppet.camera.mask import may_be_person
+from shadowpuppet.errors import HARMFUL, NOTED, Caution, ShadowPuppetWarning
+from shadowpuppet.pipeline.footage import Footage
+from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, RigLook, Survey
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.people.census import later_sets, sampled_sets, take_census
+from shadowpuppet.pipeline.rig import Rig, synchronized_frames
+from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.pipeline.survey.cautions import GOOD, clutter_cautions, condition_cautions, recovery_cautions, unlike_ready
+from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, survey_film
+from shadowpuppet.silhouette.added import SceneHint
+from shadowpuppet.threads import usable_cores
+
+OPENING, OPENED = 2.0, 40
+"""With several cameras: duration (s) of the beginning in which the person is measured, and the greatest number of frame sets kept of it."""
+RATES, LENGTHS = 0.02, 0.1
+"""Relative difference of rates, and difference of lengths (s), above which films are reported to differ."""
+
+
+def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = ()) -> Survey:
+    """Examine each camera's film, and the first seconds of all together; `hints` as in `survey_film`, by camera. Raises a
+    `ShadowPuppetError` if something cannot be used."""
+    def surveyed(footage: Footage, hint: SceneHint) -> FilmSurvey:
+        return survey_film(footage, options, brief_length(footage, options), hint)
+
+    with ThreadPoolExecutor(usable_cores(), "look") as pool:
+        films = list(pool.map(surveyed, rig.footage, hints or [SceneHint()] * len(rig.footage)))
+    silhouettes = tuple(film.silhouettes for film in films)
+    census, wide = None, tuple(each.of_several() for each in silhouettes)
+    if any(_shows_person(film) for film in films):
+        seen = max((film.sample.times[-1] for film in films if len(film.sample.times)), default=0.0)
+        census = take_census(rig.cameras, sampled_sets([film.sample for film in films], wide), later_sets(rig, wide, float(seen)))
+    several = census.number if census is not None and census.number > 1 else 0
+    silhouettes = wide if several else silhouettes
+    first = _first_sets(rig, silhouettes, options.masks)
+    step = float(np.median(np.diff(first.times))) if len(first.times) > 1 else np.nan
+    look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
+                   agreement=agreement(rig.cameras, first.masks, step))
+    refusal = _rig_refusal(look, first)
+    doubts = [*_rig_doubts(look, several > 0), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
+    if several:
+        doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
+                                 f"{several} people: each is tracked", NOTED))
+    look = replace(look, refusal=refusal, doubts=() if refusal else tuple(doubts))
+    return Survey(rig, silhouettes, silhouettes, first, look, census)
+
+
+def _shows_person(film: FilmSurvey) -> bool:
+    return any(may_be_person(mask) for mask in film.masks)
+
+
+def _first_sets(rig: Rig, silhouettes: Sequence[Silhouettes], ready: bool) -> FirstSeconds:
+    every = max(1, round(OPENING * rig.rate / OPENED))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when the run comes to it
+        frames = synchronized_frames(rig, silhouettes, ready=ready, every=every, threads=usable_cores())
+        sets = [(each.time, each.masks) for each in islice(frames, OPENED)]
+    sets = [each for each in sets if each[0] <= OPENING] or sets[:1]
+    return FirstSeconds([time for time, _ in sets], [masks for _, masks in sets])
+
+
+def _camera_look(footage: Footage, film: FilmSurvey) -> CameraLook:
+    x, y, z = footage.view.camera.centre.tolist()
+    rate = 1 / film.sample.pace if len(film.sample.times) > 1 else footage.film().rate
+    return CameraLook(name=footage.camera.name, place=(x, y, z), frames=footage.count, rate=rate, start=footage.view.start, **film.values)
+
+
+def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
+    """Why tracking is hopeless, and the remedy, in a sentence; None if it is not."""
+    bad = [(camera.name, why) for camera in look.cameras if (why := camera.quality.refusal())]
+    if len(look.cameras) - len(bad) < 2:
+        return "; ".join(f"camera {name!r}: {why}" for name, why in bad[:2])
+    if not any(sum(mask is not None and may_be_person(mask) for mask in masks) > 1 for masks in first.masks):
+        return (f"no two cameras see a person at the same time within the first {OPENING:g} s: do the films belong together, and begin "
+                "together? say in [start] of recording.toml when each began")
+    return look.agreement.refusal()
+
+
+def _rig_doubts(look: RigLook, several: bool = False) -> list[Caution]:
+    """Doubts about a rig; of `several` people the quality of silhouettes, which supposes one, says nothing."""
+    doubts = list(look.agreement.doubts())
+    rates = np.array([camera.rate for camera in look.cameras])
+    ends = {camera.name: camera.frames / camera.rate for camera in look.cameras if camera.frames is not None}
+    if np.ptp(rates) > RATES * rates.min():
+        listed = ", ".join(f"{camera.name} {camera.rate:.4g}" for camera in look.cameras)
+        doubts.append(Caution(f"the films have different rates (frames/s: {listed}): they are aligned by their times, {look.rate:.4g} sets "
+                              "a second, and a camera without a picture of a moment is left out of it; film at one rate",
+                              "films have different rates: film at one", NOTED))
+    elif ends and max(ends.values()) - min(ends.values()) > LENGTHS:
+        listed = ", ".join(f"{name} {end:.2f}" for name, end in ends.items())
+        doubts.append(Caution(f"the films have different lengths (s: {listed}): were they begun together? say in [start] of recording.toml "
+                              "when each began", "films differ in length: begun together? see [start]", NOTED))
+    for camera in look.cameras:
+        if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
+            doubts.append(unlike_ready(camera.exact_overlap).about(f"camera {camera.name!r}"))
+        quality = () if several else camera.quality.warnings()
+        warnings = (*condition_cautions(camera.condition), *clutter_cautions(camera.left_out), *quality)
+        doubts += [warning.about(f"camera {camera.name!r}").at_most(HARMFUL) for warning in warnings]
+        doubts += [Caution(f"camera {camera.name!r}: {why}", f"camera {camera.name!r} shows no usable silhouette", HARMFUL)
+                   for why in [camera.quality.refusal()] if why]
+    return doubts

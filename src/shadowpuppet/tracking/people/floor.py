@@ -1,0 +1,104 @@
+"""The floor on which people stand, and the pixels on which an upright figure at each of its places would be seen.
+
+A figure is a few rows of points across the view: trunk and head, which are silhouette; legs, of which one is; and guards above the head and
+below the feet, which are not, so that a figure has the right size and distance. (Fleuret et al. 2008 compare boxes with silhouettes so.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.geometry import Array
+
+PITCHES, MOST_PLACES = (0.1, 0.125, 0.15, 0.2), 5000
+"""Distances of neighbouring places that are tried, metres: the first that gives no more than `MOST_PLACES`."""
+REACH, HALF_WIDTH = 2.5, 6.0
+"""The floor extends this far (m) beyond the surface points that it is made from, and to at most this far from their median."""
+HEIGHTS = 1.0, 1.15, 1.3, 1.45, 1.6, 1.75, 1.9
+"""Heights of figures, metres."""
+TRUNK = tuple((share, (-0.07, 0.0, 0.07) if share < 0.85 else (-0.03, 0.0, 0.03))
+              for share in (0.5, 0.56, 0.62, 0.68, 0.74, 0.8, 0.88, 0.94))  # fmt: skip
+"""Rows of trunk and head: height over the figure's, and places across the view, metres."""
+LEGS, ASIDE = (0.06, 0.17, 0.28, 0.39), (-0.25, -0.12, 0.0, 0.12, 0.25)
+"""Heights of the rows of the legs over the figure's, and places across the view at which they may be."""
+OVER, UNDER = 0.15, -0.15
+"""Places of the guards: above the head, and above the floor, metres."""
+
+NODES = 9
+"""Number of heights between which points are interpolated."""
+
+
+class Floor(NamedTuple):
+    """Places on the floor, and figures there."""
+
+    cameras: tuple[Camera, ...]
+    level: float
+    """Height of the floor, world, metres."""
+    places: Array
+    """Of shape (N, 2), world, metres."""
+    pitch: float
+    """Distance of neighbouring places, metres."""
+    pixels: NDArray[np.int32]
+    """Index of the pixel, in a flattened mask of half the size, of each point of a figure: (N, heights, cameras, points), in the order of
+    `TRUNK`, `LEGS`, the guard above and the guard below; -1 outside of the picture."""
+
+
+def floor_under(cameras: Sequence[Camera], points: Array, level: float, reach: float = REACH) -> Floor:
+    """The floor at a `level`, metres, below surface points (P, 3), world, metres, of all people, and `reach` beyond them."""
+    middle = np.median(points[:, :2], axis=0)
+    low = np.maximum(np.percentile(points[:, :2], 1, axis=0) - reach, middle - HALF_WIDTH)
+    high = np.minimum(np.percentile(points[:, :2], 99, axis=0) + reach, middle + HALF_WIDTH)
+    pitch = next((each for each in PITCHES if np.prod(np.ceil((high - low) / each)) <= MOST_PLACES), PITCHES[-1])
+    x, y = (np.arange(start, end, pitch) for start, end in zip(low, high))
+    places = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
+    pixels = np.stack([_pixels(camera, places, level) for camera in cameras], 2)
+    return Floor(tuple(cameras), level, places, pitch, pixels)
+
+
+def _pixels(camera: Camera, places: Array, level: float) -> NDArray[np.int32]:
+    """Of the figures at places (N, 2), in one camera: (N, heights, points). A few points are projected, the others lie between them."""
+    nodes, sides = np.linspace(UNDER, HEIGHTS[-1] + OVER, NODES), np.array([ASIDE[0], 0.0, ASIDE[-1]])
+    exact = camera.project(figure_points(camera, places, level + nodes.repeat(3), np.tile(sides, NODES)))
+    exact = exact.reshape(len(places), NODES, 3, 2).astype(np.float32)
+    found = np.empty((len(places), len(HEIGHTS), POINTS), np.int32)
+    for n, height in enumerate(HEIGHTS):
+        rows = [(share * height, aside) for share, aside in TRUNK] + [(share * height, ASIDE) for share in LEGS]
+        rows += [(height + OVER, (-0.03, 0.0, 0.03)), (UNDER, ASIDE)]
+        up = (np.array([z for z, aside in rows for _ in aside]) - UNDER) / (nodes[1] - nodes[0])
+        across = np.array([each for _, aside in rows for each in aside]) / ASIDE[-1] + 1
+        k, m = np.clip(up.astype(int), 0, NODES - 2), np.clip(across.astype(int), 0, 1)
+        u, v = (up - k).astype(np.float32)[:, None], (across - m).astype(np.float32)[:, None]
+        found[:, n] = _index(camera, (1 - u) * ((1 - v) * exact[:, k, m] + v * exact[:, k, m + 1])
+                             + u * ((1 - v) * exact[:, k + 1, m] + v * exact[:, k + 1, m + 1]))  # fmt: skip
+    return found
+
+
+def figure_points(camera: Camera, places: Array, z: Array, across: Array) -> Array:
+    """Points (N, P, 3), world, at heights (P,) and places across the view (P,), metres, of figures at places (N, 2)."""
+    away = places - camera.centre[:2]
+    away = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+    x = places[:, None, 0] - away[:, None, 1] * across
+    y = places[:, None, 1] + away[:, None, 0] * across
+    return np.stack([x, y, np.broadcast_to(z, x.shape)], -1)
+
+
+def pixel_index(camera: Camera, points: Array) -> NDArray[np.int32]:
+    """Index of the pixel of points (..., 3), in a flattened mask of half the size; -1 outside of the picture."""
+    return _index(camera, camera.project(points))
+
+
+def _index(camera: Camera, pixels: Array) -> NDArray[np.int32]:
+    """The same of pixels (..., 2) of the whole picture."""
+    width, height = (camera.size[0] + 1) // 2, (camera.size[1] + 1) // 2
+    at = np.rint(np.nan_to_num(0.5 * pixels, nan=-9.0, posinf=-9.0, neginf=-9.0).clip(-9, 1e6)).astype(np.int32)
+    x, y = at[..., 0], at[..., 1]
+    return np.where((x >= 0) & (x < width) & (y >= 0) & (y < height), y * width + x, -1).astype(np.int32)
+
+
+POINTS = sum(len(aside) for _, aside in TRUNK) + len(LEGS) * len(ASIDE) + 3 + len(ASIDE)
+"""Number of points of a figure."""

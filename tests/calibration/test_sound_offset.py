@@ -1,0 +1,79 @@
+"""Offsets of films by their sound: found to a part of a frame where something is heard, and not stated where nothing is."""
+
+from __future__ import annotations
+
+import noises
+import numpy as np
+import pytest
+
+from shadowpuppet.calibration.sound_offset import RATE, SPEED_OF_SOUND, best_shift, onset_strengths, sound_offsets
+
+PLACES = np.array([[0, 0, 1], [3, 0, 1], [0, 3, 1.0], [3, 3, 1]])
+
+
+def offsets(sounds, begins=None, places=PLACES):
+    names = [f"cam{n + 1}" for n in range(len(sounds))]
+    return sound_offsets(names, sounds, begins or [0.0] * len(sounds), places[: len(sounds)])
+
+
+@pytest.mark.parametrize("kinds", [("claps",), ("steps",), ("voice",), ("steps", "voice", "claps")])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_films_that_began_at_other_times_are_put_in_step(kinds, seed):
+    rng = np.random.default_rng(seed)
+    late = np.array([0.0, 0.72, -0.31, 2.4])
+    source = rng.uniform(0, 3, 3)
+    room = noises.events(rng, 14, RATE, kinds)
+    found = offsets([noises.heard(rng, room, RATE, each, way=np.linalg.norm(place - source), loudness=rng.uniform(0.05, 0.5))
+                     for each, place in zip(late, PLACES)])
+    error = np.array(found.seconds) - late
+    assert np.ptp(error) < 2 * 4.3 / SPEED_OF_SOUND  # the sound's way is not known
+    assert found.spread[0] < 0.03
+    assert np.median(found.seconds) == pytest.approx(0, abs=1e-3)
+
+
+def test_the_intervals_hold_the_offsets():
+    inside = []
+    for seed in range(25):
+        rng = np.random.default_rng(seed)
+        late = rng.uniform(-1, 1, 3)
+        room, source = noises.events(rng, 10, RATE), rng.uniform(-1, 4, 3)
+        found = offsets([noises.heard(rng, room, RATE, each, way=np.linalg.norm(place - source)) for each, place in zip(late, PLACES)])
+        inside += [abs(a - b) <= width for a, b, width in zip(found.seconds, late - np.median(late), found.spread)]
+    assert np.mean(inside) > 0.85
+
+
+@pytest.mark.parametrize("make", [
+    lambda rng, n: 0.1 * rng.standard_normal(n),  # each microphone's own noise
+    lambda rng, n: np.zeros(n),
+    lambda rng, n: np.sin(np.arange(n) * 0.05) + 0.01 * rng.standard_normal(n),  # a hum
+])
+def test_nothing_is_stated_where_no_sound_is_shared(make):
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        assert offsets([make(rng, 12 * RATE) for _ in range(3)]).seconds == (None, None, None)
+
+
+def test_of_beats_that_repeat_themselves_none_is_chosen(rng):
+    beat = np.tile(np.exp(-np.arange(RATE // 2) / 100) * rng.standard_normal(RATE // 2), 24)
+    assert offsets([noises.heard(rng, beat, RATE, late) for late in (0.0, 0.2)]).seconds == (None, None)
+
+
+def test_a_film_without_sound_is_left_out_and_begins_are_counted(rng):
+    room = noises.events(rng, 10, RATE)
+    sounds = [noises.heard(rng, room, RATE, 0.0), None, noises.heard(rng, room[RATE:], RATE, 0.0)]
+    found = offsets(sounds, begins=[0.0, 0.0, 1.0])  # the third's sound begins a second into its film
+    assert found.seconds[1] is None
+    assert abs(found.seconds[2] - found.seconds[0]) < 0.005
+
+
+def test_short_films_have_no_offset(rng):
+    room = noises.events(rng, 1.5, RATE)
+    assert best_shift(onset_strengths(room), onset_strengths(room)) is None
+
+
+@pytest.mark.parametrize("lag", [-3.25, 0.0, 1.1])
+def test_the_sign_is_that_of_a_later_second_sound(rng, lag):
+    room = noises.events(rng, 15, RATE)
+    n = round(lag * RATE)
+    second = np.concatenate([np.zeros(max(n, 0)), room[max(-n, 0) :]])
+    assert best_shift(onset_strengths(room), onset_strengths(second)) == pytest.approx(lag, abs=0.002)

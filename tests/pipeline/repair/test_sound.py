@@ -1,0 +1,103 @@
+"""Films with sound are put in step by it where silhouettes cannot tell, and never against them."""
+
+from __future__ import annotations
+
+import made_rig
+import noises
+import numpy as np
+import pytest
+
+from shadowpuppet.errors import RecordingError
+from shadowpuppet.io.files.text import read_toml
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.repair.films import check_films
+from shadowpuppet.pipeline.repair.fix import fix_recording
+from shadowpuppet.pipeline.repair.sound import heard_offsets, in_step
+from shadowpuppet.pipeline.rig import open_rig
+
+MASKS = Options(masks=True)
+RATE = 16000
+LATE = (0, 8, 0, -3)
+"""Frames by which each film is late."""
+SECONDS = 6.0
+
+
+def films(folder, frames_of, late):
+    """A recording of 60 frames; camera k shows frame `frames_of(n, k)` as its n-th, and is heard `late[k]` frames late."""
+    cameras = made_rig.cameras()
+    count = round(SECONDS * made_rig.RATE)
+    every = made_rig.masks(cameras, count + 24)
+    path = made_rig.write(folder, cameras, [[every[frames_of(n, k)][k] for k in range(len(cameras))] for n in range(count)])
+    rng = np.random.default_rng(3)
+    room = noises.events(rng, SECONDS + 3, RATE)
+    for camera, each in zip(cameras, late):
+        heard = noises.heard(rng, room, RATE, each / made_rig.RATE, way=3.0)
+        noises.add_sound(path / "video" / f"{camera.name}.mp4", heard[: round(SECONDS * RATE)], RATE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def still(tmp_path_factory):
+    """A person who does not move, before films of which two are late."""
+    return films(tmp_path_factory.mktemp("sound") / "still", lambda n, k: 12, LATE)
+
+
+def test_a_still_person_s_films_are_put_in_step_by_what_is_heard(still):
+    rig = open_rig(still, MASKS)
+    checked = check_films(rig, MASKS)
+    found = checked.check
+    assert found.by_sound
+    assert found.late == ("cam2", "cam4")
+    assert found.lateness.frames == pytest.approx(LATE, abs=0.25)
+    assert found.starts == pytest.approx({"cam1": 0.3, "cam2": 1.1, "cam3": 0.3}, abs=0.03)
+    assert any("the films do not begin together (cam2 8.0 frames late, cam4 3.0 frames early)" in doubt for doubt in found.doubts)
+    fix = fix_recording(rig, checked)
+    assert fix.done
+    assert read_toml(still / "recording.toml", RecordingError)["start"] == found.starts
+    again = check_films(open_rig(still, MASKS), MASKS).check  # in step now
+    assert (again.by_sound, again.late, again.good) == (False, (), True)
+
+
+def test_sound_that_lags_behind_its_pictures_is_doubted_and_changes_nothing(tmp_path):
+    path = films(tmp_path / "lag", lambda n, k: n + 12, LATE)  # the pictures are in step
+    rig = open_rig(path, MASKS)
+    checked = check_films(rig, MASKS)
+    found = checked.check
+    assert (found.by_sound, found.late, found.starts) == (False, (), {})
+    assert found.sound.seconds == pytest.approx([each / made_rig.RATE for each in LATE], abs=0.025)
+    assert found.doubts[-1].startswith("sound and silhouettes disagree about the films' delays")
+    assert fix_recording(rig, checked).done == ()
+
+
+def test_sound_and_silhouettes_that_agree_are_both_stated(tmp_path):
+    path = films(tmp_path / "both", lambda n, k: n + 12 - LATE[k], LATE)
+    found = check_films(open_rig(path, MASKS), MASKS).check
+    assert found.lateness.frames == pytest.approx(LATE, abs=0.4)
+    assert found.late == ("cam2", "cam4")
+    assert not any("sound and silhouettes" in doubt for doubt in found.doubts)
+
+
+def test_films_that_are_far_from_in_step_are_found_by_sound_first(tmp_path):
+    late = (0, 24, 0, 0)  # more than silhouettes are searched for
+    path = films(tmp_path / "far", lambda n, k: n + 24 - late[k], late)
+    found = check_films(open_rig(path, MASKS), MASKS).check
+    assert found.late == ("cam2",)
+    assert found.lateness.frames == pytest.approx(late, abs=0.5)
+    assert found.starts == pytest.approx({"cam2": 2.4}, abs=0.05)
+
+
+def test_films_without_sound_and_with_a_rate_of_their_own_are_not_listened_to(tmp_path, still):
+    rig = open_rig(made_rig.write(tmp_path / "silent"), MASKS)
+    assert heard_offsets(rig) is None
+    (still / "recording.toml").write_text("rate = 5.0\n")
+    assert heard_offsets(open_rig(still, MASKS)) is None
+    (still / "recording.toml").unlink()
+
+
+def test_no_start_becomes_negative(still):
+    rig = open_rig(still, MASKS)
+    moved = in_step(rig, heard_offsets(rig))
+    starts = [footage.view.start for footage in moved.footage]
+    assert min(starts) == 0
+    assert [view.start for view in moved.recording.views] == starts
+    assert np.diff(starts) == pytest.approx(np.diff(LATE) / made_rig.RATE, abs=0.03)
