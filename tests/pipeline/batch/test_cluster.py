@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import gc
 import os
+import re
 import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -13,22 +20,71 @@ from shadowpuppet.pipeline.batch import BatchListener, make_grid, run_batch
 
 distributed = pytest.importorskip("distributed")
 dask = pytest.importorskip("dask")
+psutil = pytest.importorskip("psutil")  # Dask needs it
 pytestmark = pytest.mark.filterwarnings("default")  # theirs are not ours
 QUICK = make_grid({"masks": True, "tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}})
 
 
+class DaskCluster:
+    """A scheduler and its workers, each a process of its own, as in a laboratory."""
+
+    def __init__(self, scheduler, address):
+        self.scheduler, self.address, self.nannies = scheduler, address, []
+
+    def worker_pids(self):
+        """Of the processes that work; the nannies begin each again when it is lost."""
+        return [child.pid for nanny in self.nannies for child in psutil.Process(nanny.pid).children() if "spawn_main" in "".join(child.cmdline())]
+
+
+@contextmanager
+def dask_cluster(folder, workers):
+    """Start a scheduler and `workers` workers with one thread each; end them all."""
+    module = [sys.executable, "-P", "-m", "distributed.cli.dask_"]
+    here = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}  # what a worker is sent may be a function of this file
+    logs = [(folder / f"{index}.log").open("w+") for index in range(workers + 1)]
+    begun = []
+
+    def begin(name, *arguments):
+        command = [*module[:-1], module[-1] + name, "--no-dashboard", *arguments]
+        begun.append(subprocess.Popen(command, cwd=folder, env=here, stdout=logs[len(begun)], stderr=subprocess.STDOUT))
+        return begun[-1]
+
+    def said(log, pattern, times=1):
+        for _ in range(600):
+            text = (folder / f"{log}.log").read_text()
+            if len(found := re.findall(pattern, text)) >= times:
+                return found[-1]
+            time.sleep(0.1)
+        raise TimeoutError(f"no {pattern!r} within a minute: {text}")
+
+    try:
+        scheduler = begin("scheduler", "--host", "127.0.0.1", "--port", "0")
+        cluster = DaskCluster(scheduler, said(0, r"Scheduler at:\s+(tcp://\S+)"))
+        for _ in range(workers):
+            cluster.nannies.append(begin("worker", cluster.address, "--nthreads", "1", "--local-directory", str(folder)))
+        said(0, r"Register worker", workers)
+        yield cluster
+    finally:
+        for process in reversed(begun):
+            for child in psutil.Process(process.pid).children(recursive=True) if process.poll() is None else ():
+                child.kill()
+            process.kill()
+            process.wait()
+        for log in logs:
+            log.close()
+
+
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory):
-    place = str(tmp_path_factory.mktemp("dask"))
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=place) as found:
+    with dask_cluster(tmp_path_factory.mktemp("dask"), 2) as found:
         yield found
 
 
 class Kills(BatchListener):
     """Kills the worker that finished the first run: most of what it is given next is lost with it."""
 
-    def __init__(self, cluster) -> None:
-        self.pids = [nanny.pid for nanny in cluster.workers.values()]
+    def __init__(self, pids) -> None:
+        self.pids = pids
         self.ends, self.notes = [], []
 
     def ended(self, task, outcome, again):
@@ -41,8 +97,8 @@ class Kills(BatchListener):
 
 
 def test_a_cluster_whose_worker_is_killed_does_the_rest(cluster, recording, tmp_path):
-    kills, both = Kills(cluster), [recording, tmp_path / "gone"]
-    batch = run_batch(both, tmp_path / "out", QUICK, range(6), scheduler=cluster.scheduler_address, listener=kills)
+    kills, both = Kills(cluster.worker_pids()), [recording, tmp_path / "gone"]
+    batch = run_batch(both, tmp_path / "out", QUICK, range(6), scheduler=cluster.address, listener=kills)
     assert [run.status for run in batch.runs] == ["done"] * 6 + ["failed"] * 6
     assert sorted(seed for name, seed, status in kills.ends if status == "done") == list(range(6))
     assert "no such recording" in batch.runs[6].message
@@ -55,17 +111,16 @@ def test_a_cluster_whose_worker_is_killed_does_the_rest(cluster, recording, tmp_
 
 def test_a_second_start_elsewhere_does_what_is_missing(cluster, recording, tmp_path):
     run_batch([recording], tmp_path / "out", QUICK, [0, 1], workers=0)
-    kills = Kills(cluster)
-    kills.pids = []
+    kills = Kills([])
     kills.ends.append("nobody is killed")
-    run_batch([recording], tmp_path / "out", QUICK, range(4), scheduler=cluster.scheduler_address, listener=kills)
+    run_batch([recording], tmp_path / "out", QUICK, range(4), scheduler=cluster.address, listener=kills)
     assert sorted(kills.ends[1:]) == [("tiny", 2, "done"), ("tiny", 3, "done")]
 
 
 def test_a_run_whose_workers_are_lost_each_time_is_named(cluster, recording, tmp_path, monkeypatch):
     """As one that takes more memory than a worker may have."""
     monkeypatch.setattr("shadowpuppet.pipeline.batch.cluster.do_there", _dies)
-    batch = run_batch([recording], tmp_path / "out", QUICK, retries=0, scheduler=cluster.scheduler_address)
+    batch = run_batch([recording], tmp_path / "out", QUICK, retries=0, scheduler=cluster.address)
     assert batch.runs[0].message == "its workers were lost, one after another: killed, or out of memory"
 
 
@@ -86,18 +141,19 @@ def test_a_scheduler_that_does_not_answer_is_said(recording, tmp_path, address, 
     monkeypatch.setattr("shadowpuppet.pipeline.batch.cluster.PATIENCE", 0.5)
     with pytest.raises(ShadowPuppetError, match=r"scheduler: found '.*', at which no Dask scheduler answers"):
         run_batch([recording], tmp_path / "out", QUICK, scheduler=address)
+    left = [thing for thing in gc.get_objects() if isinstance(thing, distributed.Client) and thing.status != "closed"]
+    assert not left, "a client that the collector finds while another begins is a deadlock"
 
 
 def test_a_scheduler_that_ends_is_said(recording, tmp_path, monkeypatch):
     class Ends(BatchListener):
         def ended(self, task, outcome, again):
-            found.scheduler.loop.add_callback(found.scheduler.close)
+            found.scheduler.terminate()
 
-    monkeypatch.setattr("shadowpuppet.pipeline.batch.cluster.PATIENCE", 1)
-    with dask.config.set({"distributed.comm.timeouts.connect": "2s"}), \
-            distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0") as found, \
+    monkeypatch.setattr("shadowpuppet.pipeline.batch.cluster.PATIENCE", 5)
+    with dask.config.set({"distributed.comm.timeouts.connect": "2s"}), dask_cluster(tmp_path, 1) as found, \
             pytest.raises(ShadowPuppetError, match=r"scheduler: the connection to .* was lost"):
-        run_batch([recording], tmp_path / "out", QUICK, range(50), scheduler=found.scheduler_address, listener=Ends())
+        run_batch([recording], tmp_path / "out", QUICK, range(50), scheduler=found.address, listener=Ends())
     assert (tmp_path / "out" / "summary.csv").exists()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -47,12 +48,17 @@ class Cluster(WorkerPool):
         except ImportError:
             raise ShadowPuppetError("scheduler: Dask's `distributed` is not installed; pip install 'shadowpuppet[batch]'") from None
         file: dict[str, Any] = {("scheduler_file" if Path(self._address).is_file() else "address"): self._address}
+        said = None
         try:
             self._client: Client = Client(**file, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError) as error:
             said = " ".join(str(error).split())
+        if said is not None:
+            # A client that found no scheduler is closed by its __del__, which takes the lock under which any later client begins its
+            # loop: collected while one does, it stops the program for good. So it is collected here, where nothing holds the lock.
+            gc.collect()
             raise ShadowPuppetError(f"scheduler: found {self._address!r}, at which no Dask scheduler answers ({said}); expected an address "
-                                    "as tcp://host:8786, or a scheduler file") from None
+                                    "as tcp://host:8786, or a scheduler file")
         self._ended = as_completed(loop=self._client.loop)
         threads: Any = self._client.nthreads()  # by worker
         if any(count > 1 for count in threads.values()):
