@@ -1,17 +1,19 @@
 """The factors of doubt (`tracking.doubt`), chosen on made recordings, clean and spoiled, and how well they hold on recordings left out.
 
-    python benchmarks/calibrate_doubt.py [--kind monocular,multiview] [--write] [--markdown docs/doubt.md]
+    python benchmarks/calibrate_doubt.py [--kind monocular,multiview] [--write] [--markdown docs/doubt.md] [--test RECORDING ...]
 
 Every recording of the proving grounds (`synthetic.proving_ground`, `proving_rings`; made in build where they are missing) is tracked clean
 and with each fault of `FAULTS` in its silhouettes; components of doubt and errors are kept in build/doubt. The factors of a group of joints
 along an axis minimise the mean interval score of 90 % intervals (Gneiting and Raftery 2007), over all runs. Tables and pictures are of
-recordings left out: a third at a time is tested with the factors of the others. `--write` writes
-src/shadowpuppet/tracking/doubt/factors.toml; `--markdown` the tables to their places in a page, and the pictures to assets beside it.
+recordings left out: a third at a time is tested with the factors of the others; `--test` tests other recordings, as they are, with the
+factors of all made ones. `--write` writes src/shadowpuppet/tracking/doubt/factors.toml; `--markdown` the tables to their places in a
+page, and the pictures to assets beside it.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -96,8 +98,8 @@ LEAST = {"constant": 0.7, "distance": 1.0}
 LEAST_SEVERAL = {"constant": 0.4}
 """Least factors with one camera and with several: made recordings know neither the doubt in where a joint is in a body, nor that in the
 distance. Several cameras fit the body to the person's surface, and so show most of the first."""
-SILENT = 0.005
-"""Share of the joints that may be over `FAR_ERROR` off in a limb that is vouched for."""
+SILENT, MOST_SILENT = 0.005, 0.01
+"""Share of the joints of a kind of limb, and of all joints of a run, that may be over `FAR_ERROR` off in a limb that is vouched for."""
 NEAR = 0.1
 """Error (m) below which a doubtful joint is a false alarm."""
 RANKS = 20
@@ -153,20 +155,22 @@ def folds(runs: Sequence[Tracked]) -> Iterator[tuple[list[Tracked], list[Tracked
         yield [run for run in runs if run.recording in tested], [run for run in runs if run.recording not in tested] or list(runs)
 
 
+def judged(own: Sequence[Tracked], others: Sequence[Tracked]) -> tuple[list[Tested], list[LimbJoint]]:
+    """Joints and limbs of some runs, judged by factors and limits of others."""
+    known, by_joint = errors_of(others), dict[tuple[str, int], list[Array]]()
+    factors = fit_all(known)
+    for run in known:
+        by_joint.setdefault((run.joint, run.axis), []).append(np.abs(run.errors))
+    best = {key: float(np.quantile(np.concatenate(sizes), 0.9)) / WIDTH for key, sizes in by_joint.items()}
+    limits = fit_limits(limb_joints(others, factors))
+    return ([Tested(run, deviations(factors, run), best[run.joint, run.axis]) for run in errors_of(own)],
+            [each._replace(limit=limits[each.kind]) for each in limb_joints(own, factors)])
+
+
 def left_out(runs: Sequence[Tracked]) -> tuple[list[Tested], list[LimbJoint]]:
     """Joints and limbs of all runs, judged by factors and limits of other recordings."""
-    joints, limbs = list[Tested](), list[LimbJoint]()
-    for own, others in folds(runs):
-        known = errors_of(others)
-        factors = fit_all(known)
-        by_joint = dict[tuple[str, int], list[Array]]()
-        for run in known:
-            by_joint.setdefault((run.joint, run.axis), []).append(np.abs(run.errors))
-        best = {key: float(np.quantile(np.concatenate(sizes), 0.9)) / WIDTH for key, sizes in by_joint.items()}
-        joints += [Tested(run, deviations(factors, run), best[run.joint, run.axis]) for run in errors_of(own)]
-        limits = fit_limits(limb_joints(others, factors))
-        limbs += [each._replace(limit=limits[each.kind]) for each in limb_joints(own, factors)]
-    return joints, limbs
+    joints, limbs = zip(*itertools.starmap(judged, folds(runs)))
+    return list(itertools.chain(*joints)), list(itertools.chain(*limbs))
 
 
 class LimbJoint(NamedTuple):
@@ -197,15 +201,31 @@ def limb_joints(runs: Sequence[Tracked], factors: Factors) -> list[LimbJoint]:
     return found
 
 
+def by_run(joints: Iterable[LimbJoint]) -> dict[Tracked, list[LimbJoint]]:
+    """The joints of each run."""
+    found = dict[Tracked, list[LimbJoint]]()
+    for each in joints:
+        found.setdefault(each.run, []).append(each)
+    return found
+
+
 def fit_limits(joints: Sequence[LimbJoint]) -> dict[str, float]:
-    """Of each kind of limb the greatest limit (m), up to `FAR_ERROR`, with at most `SILENT` of the joints far off and vouched for."""
-    out = {}
+    """Of each kind of limb the greatest limit (m), up to `FAR_ERROR`, at which at most `SILENT` of its joints, and `MOST_SILENT` of the
+    joints of any one run, are far off and vouched for."""
+    out, number = {}, {run: sum(len(each.errors) for each in own) for run, own in by_run(joints).items()}
     for kind in dict.fromkeys(each.kind for each in joints):
-        errors, radius = (np.concatenate([getattr(each, name) for each in joints if each.kind == kind]) for name in ("errors", "radius"))
-        order = np.argsort(radius)
-        silent = np.cumsum(errors[order] > FAR_ERROR) / len(errors)
-        out[kind] = min(float(radius[order][min(np.searchsorted(silent, SILENT, "right"), len(errors) - 1)]), FAR_ERROR)
+        own = [each for each in joints if each.kind == kind]
+        allowed = [_limit(part, MOST_SILENT * number[run]) for run, part in by_run(own).items()]
+        out[kind] = min(FAR_ERROR, _limit(own, SILENT * sum(len(each.errors) for each in own)), *allowed)
     return out
+
+
+def _limit(joints: Sequence[LimbJoint], silent: float) -> float:
+    """The greatest limit (m) at which at most a number `silent` of joints are far off and vouched for."""
+    errors, radius = (np.concatenate([getattr(each, name) for each in joints]) for name in ("errors", "radius"))
+    order = np.argsort(radius)
+    vouched = np.searchsorted(np.cumsum(errors[order] > FAR_ERROR), silent, "right")
+    return float(np.r_[0.0, radius[order[:-1]], np.inf][vouched])
 
 
 def joint_table(tested: Sequence[Tested]) -> str:
@@ -225,13 +245,18 @@ def joint_table(tested: Sequence[Tested]) -> str:
 
 def limb_table(tested: Sequence[LimbJoint]) -> str:
     """Silence and false alarms by kind of limb, as Markdown."""
-    lines = ["| limb | limit, mm | over 300 mm | over 300 mm and vouched for | under 100 mm, called doubtful |", "|---|" + "---:|" * 4]
+    lines = ["| limb | limit, mm | over 300 mm | over 300 mm and vouched for | the same, worst run | under 100 mm, called doubtful |",
+             "|---|" + "---:|" * 5]
+    number = {run: sum(len(each.errors) for each in own) for run, own in by_run(tested).items()}
     for kind in dict.fromkeys(each.kind for each in tested):
         own = [each for each in tested if each.kind == kind]
         errors, doubtful = np.concatenate([each.errors for each in own]), np.concatenate([each.radius > each.limit for each in own])
         far, near = errors > FAR_ERROR, errors < NEAR
+        worst = max(sum(((each.errors > FAR_ERROR) & (each.radius <= each.limit)).sum() for each in part) / number[run]
+                    for run, part in by_run(own).items())
         lines.append(f"| {kind} | {1000 * np.mean([each.limit for each in own]):.0f} | {100 * far.mean():.1f} % | "
-                     f"{100 * (far & ~doubtful).mean():.2f} % | {100 * (near & doubtful).sum() / max(near.sum(), 1):.0f} % |")
+                     f"{100 * (far & ~doubtful).mean():.2f} % | {100 * worst:.1f} % | "
+                     f"{100 * (near & doubtful).sum() / max(near.sum(), 1):.0f} % |")
     return "\n".join(lines)
 
 
@@ -315,6 +340,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kind", default="monocular,multiview", help="trackers, separated by commas")
     parser.add_argument("--recordings", type=Path, nargs="*", help="folders; the proving grounds without")
+    parser.add_argument("--test", type=Path, nargs="*", default=[], help="recordings with truth that nothing is fitted to")
     parser.add_argument("--folder", type=Path, default=BUILD, help="where components and errors are kept")
     parser.add_argument("--write", action="store_true", help="write the factors into the package")
     parser.add_argument("--markdown", type=Path, help="page for the tables, at their places; pictures go to assets beside it")
@@ -332,6 +358,9 @@ def main() -> None:
             print(f"\n{kind}, {title}\n\n{text}", flush=True)
             if args.markdown:
                 into_page(args.markdown, f"{kind}, {title}", text)
+        for path in args.test:
+            known = judged(read_runs(collect(kind, path, args.folder, args.again, clean=True)), runs)
+            print(f"\n{kind}, {path.name}\n\n{joint_table(known[0])}\n\n{limb_table(known[1])}", flush=True)
         factors = fit_all(errors_of(runs))
         if any(len(run.modes) for run in runs):
             parts = list(folds(runs))

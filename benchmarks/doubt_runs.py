@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -18,18 +19,19 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.evaluation.joint_angles import wrapped
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
-from shadowpuppet.motion.motion import BLANK, JointTable, Mode
+from shadowpuppet.motion.motion import BLANK, JointTable, Mode, MotionBuilder, MotionFrame
 from shadowpuppet.motion.synchronization import at_times
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
 from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.synthetic import proving_rings, synthesize
-from shadowpuppet.tracking.doubt.doubt import Points, pose_deviations
+from shadowpuppet.tracking.doubt.doubt import Points, pose_deviations, state_doubt
 from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
 from shadowpuppet.tracking.doubt.multiview import MultiviewDoubt
 from shadowpuppet.tracking.doubt.variance import ModeWeights, variance_model
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
 
 RINGS, RING_SECONDS, RING_RATE = GROUND.parent / "rings_short", 2.0, 30.0
 BUILD = GROUND.parent / "doubt"
@@ -191,7 +193,8 @@ LATE = 5
 
 
 def track_multiview(path: Path) -> Iterator[Tracked]:
-    """A recording of several cameras with every fault."""
+    """A recording of several cameras with every fault. Errors are those of the smoothed motion, which is what a run's deviations are stated
+    of: the backward pass keeps feet on the floor."""
     options = make_options({"overlay": False})
     survey = survey_rig(open_rig(path, options), options)
     subject = fit_multiview(np.random.default_rng(0), survey, options)
@@ -199,23 +202,28 @@ def track_multiview(path: Path) -> Iterator[Tracked]:
     frames = [(each.time, each.masks) for each in synchronized_frames(survey.rig, survey.silhouettes)]
     empty = [np.zeros(camera.size[::-1], bool) for camera in subject.hull.cameras]
     films = [[none if (mask := masks[n]) is None else mask for _, masks in frames] for n, none in enumerate(empty)]
-    times, names = [time for time, _ in frames], subject.body.landmark_names
+    times, body, names = [time for time, _ in frames], subject.body, subject.body.landmark_names
+    smoother = MotionSmoother(body.skeleton, subject.joints, gaps=0)
     late: Fault = lambda rng, masks, rate: [masks[max(n - LATE, 0)] for n in range(len(masks))]  # noqa: E731
     for n, (fault, spoil) in enumerate((FAULTS | {"late": late}).items()):
         spoiled = [spoil(np.random.default_rng([n, m]), film, rate) if m == 0 or fault not in ONE_CAMERA else film
                    for m, film in enumerate(films)]
-        rng, doubt, state, before, rows, poses = np.random.default_rng(1), MultiviewDoubt(subject.tracker), None, None, [], []
+        rng, doubt, state, before, rows = np.random.default_rng(1), MultiviewDoubt(subject.tracker), None, None, []
+        motion = MotionBuilder("", [dof.name for dof in body.skeleton.dofs], [names[column] for column in subject.joint_columns])
         for seconds, masks in zip(times, zip(*spoiled)):
             observation = subject.observe(masks)
             state = subject.next_state(rng, state, observation)
             if state is None:
-                poses.append(np.full(len(subject.body.skeleton.dofs), np.nan))
+                motion.append(MotionFrame(seconds, "absent"))
                 rows.append(None)
                 continue
             found, before = doubt.evidence(state, observation.points, masks, seconds, before)
             rows.append(found.components)
-            poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)
-        errors = _places(at_times(truth, np.array(times)), names) - subject.body.points(np.array(poses))
+            stated = state_doubt("multiview", found, names, body.skeleton, body.points, state.pose, state.status, np.eye(3))
+            motion.append(MotionFrame(seconds, state.status, state.pose, subject.joints(state.pose[None])[0], stated.pose_sd,
+                                      stated.joint_sd[subject.joint_columns], state.cost, state.overlap))
+        poses = smoother(motion.build()).motion.poses
+        errors = _places(at_times(truth, np.array(times)), names) - body.points(poses)
         some = next(row for row in rows if row is not None)
         components = {name: np.array([np.zeros((len(names), 3)) if row is None else row[name] for row in rows]) for name in some}
         yield Tracked(path.name, fault, names, components, errors, np.empty((0, 2)))
@@ -236,14 +244,14 @@ def _places(truth: JointTable, names: Sequence[str]) -> Array:
     return np.stack([truth.positions[:, truth.names.index(name)] if name in truth.names else nowhere for name in names], 1)
 
 
-def collect(kind: str, path: Path, build: Path, again: bool) -> list[Path]:
-    """Files with the runs of a recording, one a fault, in a folder of `build`."""
+def collect(kind: str, path: Path, build: Path, again: bool, clean: bool = False) -> list[Path]:
+    """Files with the runs of a recording, one a fault, in a folder of `build`; `clean`: of the one without a fault."""
     folder = build / kind / path.name
     if path.parent == RINGS:
         make_ring(path)
     if again or not (folder / "done").exists():
         folder.mkdir(parents=True, exist_ok=True)
-        for run in TRACK[kind](path):
+        for run in islice(TRACK[kind](path), 1 if clean else None):
             np.savez_compressed(folder / f"{run.fault.replace(' ', '_')}.npz", joints=run.joints, errors=run.errors,
                                 modes=run.modes, names=list(run.components), dofs=run.dofs, pose_errors=run.pose_errors,
                                 pose_sd=run.pose_sd, statuses=run.statuses, weighting=run.weighting or (),
