@@ -99,7 +99,10 @@ LEAST_SEVERAL = {"constant": 0.4}
 """Least factors with one camera and with several: made recordings know neither the doubt in where a joint is in a body, nor that in the
 distance. Several cameras fit the body to the person's surface, and so show most of the first."""
 SILENT, MOST_SILENT = 0.005, 0.01
-"""Share of the joints of a kind of limb, and of all joints of a run, that may be over `FAR_ERROR` off in a limb that is vouched for."""
+"""Share of a kind of limb's joints that may be over `FAR_ERROR` off in a limb that is vouched for; and of all joints of a run, above which
+`price_table` counts it."""
+LIMITS = (0.24, 0.22, 0.20, 0.185, 0.17, 0.155)
+"""Limits (m) of arms in that table."""
 NEAR = 0.1
 """Error (m) below which a doubtful joint is a false alarm."""
 RANKS = 20
@@ -210,14 +213,9 @@ def by_run(joints: Iterable[LimbJoint]) -> dict[Tracked, list[LimbJoint]]:
 
 
 def fit_limits(joints: Sequence[LimbJoint]) -> dict[str, float]:
-    """Of each kind of limb the greatest limit (m), up to `FAR_ERROR`, at which at most `SILENT` of its joints, and `MOST_SILENT` of the
-    joints of any one run, are far off and vouched for."""
-    out, number = {}, {run: sum(len(each.errors) for each in own) for run, own in by_run(joints).items()}
-    for kind in dict.fromkeys(each.kind for each in joints):
-        own = [each for each in joints if each.kind == kind]
-        allowed = [_limit(part, MOST_SILENT * number[run]) for run, part in by_run(own).items()]
-        out[kind] = min(FAR_ERROR, _limit(own, SILENT * sum(len(each.errors) for each in own)), *allowed)
-    return out
+    """Of each kind of limb the greatest limit (m), up to `FAR_ERROR`, with at most `SILENT` of its joints far off and vouched for."""
+    kinds = {kind: [each for each in joints if each.kind == kind] for kind in dict.fromkeys(each.kind for each in joints)}
+    return {kind: min(FAR_ERROR, _limit(own, SILENT * sum(len(each.errors) for each in own))) for kind, own in kinds.items()}
 
 
 def _limit(joints: Sequence[LimbJoint], silent: float) -> float:
@@ -257,6 +255,21 @@ def limb_table(tested: Sequence[LimbJoint]) -> str:
         lines.append(f"| {kind} | {1000 * np.mean([each.limit for each in own]):.0f} | {100 * far.mean():.1f} % | "
                      f"{100 * (far & ~doubtful).mean():.2f} % | {100 * worst:.1f} % | "
                      f"{100 * (near & doubtful).sum() / max(near.sum(), 1):.0f} % |")
+    return "\n".join(lines)
+
+
+def price_table(tested: Sequence[LimbJoint]) -> str:
+    """What less silence of arms costs in false alarms, by their limit, as Markdown. Shares of silence are of all joints of the runs."""
+    lines = ["| limit of arms, mm | over 300 mm and vouched for | runs with over 1 % of these | under 100 mm, called doubtful |",
+             "|---|" + "---:|" * 3]
+    number = {run: sum(len(each.errors) for each in own) for run, own in by_run(tested).items()}
+    arms = [each for each in tested if each.kind == "arm"]
+    for limit in LIMITS:
+        silent = {run: sum(((each.errors > FAR_ERROR) & (each.radius <= limit)).sum() for each in own) for run, own in by_run(arms).items()}
+        near, doubted = (sum(((each.errors < NEAR) & (each.radius > least)).sum() for each in arms) for least in (-1, limit))
+        often = sum(silent[run] > MOST_SILENT * number[run] for run in silent)
+        lines.append(f"| {1000 * limit:.0f} | {100 * sum(silent.values()) / sum(number.values()):.2f} % | {often} of {len(silent)} | "
+                     f"{100 * doubted / max(near, 1):.0f} % |")
     return "\n".join(lines)
 
 
@@ -360,11 +373,12 @@ def main() -> None:
                 into_page(args.markdown, f"{kind}, {title}", text)
         for path in args.test:
             known = judged(read_runs(collect(kind, path, args.folder, args.again, clean=True)), runs)
-            print(f"\n{kind}, {path.name}\n\n{joint_table(known[0])}\n\n{limb_table(known[1])}", flush=True)
+            print(f"\n{kind}, {path.name}\n\n{joint_table(known[0])}\n\n{limb_table(known[1])}\n\n{price_table(known[1])}", flush=True)
         factors = fit_all(errors_of(runs))
         if any(len(run.modes) for run in runs):
             parts = list(folds(runs))
-            tables = {"modes": mode_table(parts), "degrees of freedom": dof_table(parts), "rules": arm_alarms(runs, factors)}
+            tables = {"modes": mode_table(parts), "degrees of freedom": dof_table(parts), "rules": arm_alarms(runs, factors),
+                      "price": price_table(limbs)}
             for title, text in tables.items():
                 print(f"\n{kind}, {title}\n\n{text}", flush=True)
                 if args.markdown:

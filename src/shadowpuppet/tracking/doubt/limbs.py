@@ -13,7 +13,8 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import doubtful_joints, doubtful_limbs
 
 GROUPS = {"pelvis": ("pelvis",), "neck": ("neck", "head"), "shoulder": ("shoulder",), "elbow": ("elbow",),
-          "hand": ("wrist", "hand", "fist"), "hip": ("hip",), "knee": ("knee",), "ankle": ("ankle", "heel", "toe")}
+          "hand": ("wrist", "hand", "fist"), "hip": ("hip",), "knee": ("knee",), "ankle": ("ankle",),
+          "sole": ("heel", "toe")}
 """Groups of joints that share their factors of doubt; left and right are alike."""
 _GROUP_OF = {joint: group for group, joints in GROUPS.items() for joint in joints}
 LEG_PARTS = ("thigh", "shank", "foot", "upper_leg", "lower_leg")

@@ -17,7 +17,7 @@ from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of
 
 TABLE = "factors.toml"
 """The factors, as `benchmarks/calibrate_doubt.py` writes them."""
-LIKE = {"hip": "shoulder", "knee": "elbow", "ankle": "hand"}
+LIKE = {"hip": "shoulder", "knee": "elbow", "ankle": "hand", "sole": "hand"}
 """Groups of the arms whose factors the legs' have where none are calibrated: one camera is calibrated on upper bodies."""
 Components = Mapping[str, Array]
 """Lengths (L, 3), metres, by name: of each joint along each of three axes."""
