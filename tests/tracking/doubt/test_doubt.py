@@ -32,6 +32,14 @@ def test_every_joint_and_part_of_every_body_has_a_limb_a_group_and_a_lever(name)
     assert all(0.1 < lever_of(joint) < 1 for joint in body.landmark_names)
 
 
+def test_soles_have_factors_of_their_own_with_several_cameras_and_hands_factors_with_one():
+    """Smoothed ankles are nearer to the truth than heels and toes, which made the ankles' intervals too wide."""
+    several, one = (variance_model(kind).factors for kind in ("multiview", "monocular"))
+    ankle, sole, hand = (list(GROUPS).index(group_of(joint)) for joint in ("left_ankle", "left_toe", "left_hand"))
+    assert not np.array_equal(several[ankle], several[sole])
+    assert np.array_equal(one[sole], one[hand])
+
+
 @pytest.mark.parametrize("kind", ["monocular", "multiview"])
 def test_the_calibrated_factors_are_whole(kind):
     model = variance_model(kind)
