@@ -150,7 +150,8 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
     prior = known.prior if settings.method == "hybrid" else None
     summary: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,
                                "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
-    tracker = MultiviewTracker(person.body, tuple(cameras), settings, prior, library, looks=looks_in(settings.patience, rate))
+    tracker = MultiviewTracker(person.body, tuple(cameras), settings, prior, library, looks=looks_in(settings.patience, rate),
+                               carve=hull.points if settings.odd_camera else None)
     return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull, tracker=tracker,
                             beside=tuple(_beside(each, picture.mask(person.pose), camera.size)
                                          for each, picture, camera in zip(person.unexplained, tracker.views.pictures, cameras)))

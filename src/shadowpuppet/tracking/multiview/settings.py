@@ -124,6 +124,8 @@ class MultiviewSettings:
     """The estimated pose: that of the particle of greatest weight, or the weighted mean."""
     patience: NonNegative = 1.0
     """Seconds after which parts of the silhouettes that the body does not explain, such as a chair, are left out; 0: never."""
+    odd_camera: bool = True
+    """Whether a camera whose silhouette suddenly contradicts all others (late, bumped, covered) is left out while it does."""
     recover: bool = True
     """Search for the person again after a loss, a jump or an absence. The paper's filter continues from its last particles."""
     surface: SurfaceSettings = SurfaceSettings()
@@ -149,6 +151,7 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "silhouettes": 0.0,
         "posture": 0.0,
         "patience": 0.0,
+        "odd_camera": False,
         "surface": {"epsilon": 0.3, "tau": 0.06, "nearest": "euclidean"},
     },
 }
