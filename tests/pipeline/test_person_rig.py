@@ -21,7 +21,8 @@ from shadowpuppet.pipeline import person_rig
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
-from shadowpuppet.pipeline.track import MULTIVIEW, prepare, track_recording
+from shadowpuppet.pipeline.survey.rig import survey_rig
+from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.tracking.multiview.settings import for_smeared
 
 FRAMES = 16
@@ -126,10 +127,10 @@ def test_the_same_seed_is_the_same_run(recording, run, tmp_path):
 @pytest.mark.parametrize(("smeared", "emptiness", "silhouettes"), [(False, 2.0, 0.1), (True, 0.5, 0.05)])
 def test_silhouettes_of_films_that_have_lost_detail_hold_the_body_less(untaught, monkeypatch, smeared, emptiness, silhouettes):
     monkeypatch.setattr(Silhouettes, "smeared", property(lambda self: smeared))
-    options = make_options(QUICK)
-    subject = prepare(np.random.default_rng(0), open_rig(untaught, options), options, MULTIVIEW).check()
-    settings = subject.tracker.settings
-    assert (settings.gauss_newton.emptiness, settings.silhouettes) == pytest.approx((emptiness, silhouettes))
+    used, options = [], make_options(QUICK)
+    monkeypatch.setattr(person_rig, "fit_in_views", lambda rng, cameras, views, options, *rest: used.append(options.multiview))
+    person_rig.fit_multiview(np.random.default_rng(0), survey_rig(open_rig(untaught, options), options), options)
+    assert (used[0].gauss_newton.emptiness, used[0].silhouettes) == pytest.approx((emptiness, silhouettes))
     assert for_smeared(options.multiview, 0.0) is options.multiview
 
 

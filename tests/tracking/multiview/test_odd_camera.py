@@ -40,7 +40,7 @@ def test_what_is_usual_follows_slowly_and_that_of_the_odd_one_more_slowly():
     np.testing.assert_array_equal(adapted(np.array([np.nan, 0.5]), np.array([0.7, np.nan]), None), [0.7, 0.5])
 
 
-def tracked(carve: bool, late: int | None = None) -> tuple[np.ndarray, list]:
+def tracked(carve: bool, late: int = 0) -> tuple[np.ndarray, list]:
     """Joint errors (T, L) of a walk, metres, in which a camera's pictures are `late` frames late from frame `JUMP` on; and the states."""
     poses, seen = actor.filmed(frames=FRAMES, begin=0.2)
     rows = [list(masks) for _, masks in seen]
@@ -56,7 +56,7 @@ def tracked(carve: bool, late: int | None = None) -> tuple[np.ndarray, list]:
 
 
 def test_a_camera_that_jumps_back_does_not_disturb_the_body():
-    clean, with_it, without_it = (tracked(carve, late)[0][JUMP:].mean() for carve, late in ((False, None), (False, 5), (True, 5)))
+    clean, with_it, without_it = (tracked(carve, late)[0][JUMP:].mean() for carve, late in ((False, 0), (False, 5), (True, 5)))
     assert without_it < 1.3 * clean + 0.003
     assert without_it < 0.7 * with_it
 

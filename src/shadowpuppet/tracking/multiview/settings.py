@@ -114,8 +114,8 @@ class MultiviewSettings:
     sigma_cost: Positive = 0.003
     """sigma of eq. 29 (m): a pose that costs sigma^2 more than the best weighs 1/e."""
     silhouettes: NonNegative = 0.1
-    """Weight (m^2) of the share of pixels in which drawn body and silhouettes differ; added to the cost of the surface points. Half of it if
-    all films have lost detail to compression."""
+    """Weight (m^2) of the share of pixels in which drawn body and silhouettes differ; added to the cost of the surface points. Half of it
+    if all films have lost detail to compression."""
     posture: NonNegative = 2e-6
     """Weight of the pull to usual postures, or those of the training motion (m^2 per squared deviation). It determines what the surface
     does not show, for example how a bend divides between pelvis and chest."""
