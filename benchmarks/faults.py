@@ -72,6 +72,8 @@ class Measures(NamedTuple):
     overlap: Array
     """Intersection over union of silhouettes and exact masks of the cameras as calibrated, mean of the cameras, of shape (T,); not a number
     where the person cannot be seen."""
+    aside: tuple[str, ...] = ()
+    """Cameras that are set aside, and why, of each frame; empty where none is."""
     refused: str = ""
     """Why the film could not be tracked."""
     verdict: str = "bad"
@@ -109,7 +111,7 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
     except ShadowPuppetError as error:
         count = len(truth.times)
         return Measures(truth.times, np.where(_upto(seen, count), LOST_ERROR, np.nan), np.full(count, np.nan), np.full(count, "lost"),
-                        np.zeros(count, bool), np.zeros((count, 5)), np.full(count, np.nan), str(error))
+                        np.zeros(count, bool), np.zeros((count, 5)), np.full(count, np.nan), ("",) * count, str(error))
     mean, worst, judged = _errors(motion, truth)
     seen = _upto(seen, len(motion))
     mean, worst, judged = np.where(seen, mean, np.nan), np.where(seen, worst, np.nan), judged * seen[:, None]
@@ -122,7 +124,14 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
     shutil.rmtree(path / "run")
     vouched = (motion.limb_status == "tracked").any(1)
     return Measures(motion.times, mean, worst, motion.status, vouched, judged, np.where(seen, alike, np.nan),
-                    verdict=metrics["verdict"]["word"], expected=expected_error(motion))
+                    _aside(run, motion), verdict=metrics["verdict"]["word"], expected=expected_error(motion))
+
+
+def _aside(run: Summary, motion: Motion) -> tuple[str, ...]:
+    """For each frame the cameras that are set aside, and why."""
+    found = run.metrics.get("set_aside", ())
+    return tuple(", ".join(f"{one['camera']} {one['why']}" for one in found if one["from_s"] - 1e-3 <= time <= one["to_s"] + 1e-3)
+                 for time in motion.times.tolist())
 
 
 def _nearest(folder: Path, run: Summary, truth: JointTable) -> tuple[Motion, dict[str, Any]]:
@@ -216,8 +225,13 @@ class Figures(NamedTuple):
         return [f"{100 * share:.{digits}f}" for share, digits in zip(shares, (1, 1, 0))]
 
     def noticed(self) -> str:
-        """Mean time in seconds from its beginning to the first frame that is not `tracked`, or has no limb that is."""
-        return self._after(self.row.begin, lambda one, n: one.status[n] != "tracked" or not one.vouched[n]) if self.row.begin else ""
+        """Mean time in seconds from its beginning to the first frame that is not `tracked`, has no limb that is, or in which a camera is
+        set aside; and which ones are."""
+        def said(one: Measures, n: int) -> bool:
+            return one.status[n] != "tracked" or not one.vouched[n] or bool(one.aside[n])
+
+        cameras = dict.fromkeys(why for one, _ in self.runs for why in one.aside if why)
+        return self._after(self.row.begin, said) + "".join(f"; {why}" for why in cameras) if self.row.begin else "; ".join(cameras)
 
     def recovered(self) -> str:
         """Mean time in seconds from its end to the first of some good frames."""

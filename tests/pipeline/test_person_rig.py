@@ -19,7 +19,11 @@ from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline import person_rig
 from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.rig import open_rig
+from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.pipeline.track import track_recording
+from shadowpuppet.tracking.multiview.settings import for_smeared
 
 FRAMES = 16
 QUICK = {"masks": True, "multiview": {"particles": 16}, "training": {"regions": 6, "starts": 1}}
@@ -118,6 +122,16 @@ def test_who_was_there_is_reported_and_saved(run):
 def test_the_same_seed_is_the_same_run(recording, run, tmp_path):
     track_recording(recording, tmp_path / "again", make_options(QUICK))
     assert (tmp_path / "again" / "joints.csv").read_bytes() == (folder_of(run) / "joints.csv").read_bytes()
+
+
+@pytest.mark.parametrize(("smeared", "emptiness", "silhouettes"), [(False, 2.0, 0.1), (True, 0.5, 0.05)])
+def test_silhouettes_of_films_that_have_lost_detail_hold_the_body_less(untaught, monkeypatch, smeared, emptiness, silhouettes):
+    monkeypatch.setattr(Silhouettes, "smeared", property(lambda self: smeared))
+    used, options = [], make_options(QUICK)
+    monkeypatch.setattr(person_rig, "fit_in_views", lambda rng, cameras, views, options, *rest: used.append(options.multiview))
+    person_rig.fit_multiview(np.random.default_rng(0), survey_rig(open_rig(untaught, options), options), options)
+    assert (used[0].gauss_newton.emptiness, used[0].silhouettes) == pytest.approx((emptiness, silhouettes))
+    assert for_smeared(options.multiview, 0.0) is options.multiview
 
 
 # Options as a user types them -----------------------------------------------------------------------------------------

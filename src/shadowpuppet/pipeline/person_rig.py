@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -31,6 +31,7 @@ from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.multiview import Before, MultiviewDoubt
 from shadowpuppet.tracking.doubt.steps import Trail
+from shadowpuppet.tracking.multiview.settings import for_smeared
 from shadowpuppet.tracking.multiview.size_estimation import estimate_height, estimate_sizes, size_deviations
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -119,6 +120,8 @@ def fit_multiview(rng: np.random.Generator, survey: Survey, options: Options) ->
     not usable."""
     rig, recording = survey.rig, survey.rig.recording
     check_body(options)
+    smeared = float(np.mean([each.smeared for each in survey.silhouettes]))
+    options = replace(options, multiview=for_smeared(options.multiview, smeared))
     training = None if recording.training is None else read_motion(recording.training)
     return fit_in_views(rng, rig.cameras, survey.first.masks, options, rig.rate / options.every, recording.subject.height, training)
 
@@ -150,7 +153,8 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
     prior = known.prior if settings.method == "hybrid" else None
     summary: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,
                                "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
-    tracker = MultiviewTracker(person.body, tuple(cameras), settings, prior, library, looks=looks_in(settings.patience, rate))
+    tracker = MultiviewTracker(person.body, tuple(cameras), settings, prior, library, looks=looks_in(settings.patience, rate),
+                               carve=hull.points if settings.odd_camera else None)
     return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull, tracker=tracker,
                             beside=tuple(_beside(each, picture.mask(person.pose), camera.size)
                                          for each, picture, camera in zip(person.unexplained, tracker.views.pictures, cameras)))

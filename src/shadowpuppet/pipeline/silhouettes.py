@@ -37,6 +37,12 @@ class Silhouettes:
     before: Segmenter | None = None
     """The segmenter without what was added."""
 
+    @property
+    def smeared(self) -> bool:
+        """Whether the film has lost detail to compression or focus, so that thin limbs are missing in its silhouettes."""
+        correction = None if self.segmenter is None else self.segmenter.correction
+        return correction is not None and correction.detail is not None
+
     def __call__(self, frame: CameraFrame) -> Mask:
         """The person's mask (H, W)."""
         if self.segmenter is None:

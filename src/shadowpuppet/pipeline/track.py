@@ -211,7 +211,7 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         smooth_run(writer, [(0, prepared.check())], options, listener, writer.motion, leans)
     written = read_run(folder)
     metrics = written.metrics | evaluated(rig, written.motion)
-    metrics["verdict"] = verdict_of_run(prepared.look, written.motion).plain()
+    metrics["verdict"] = verdict_of_run(prepared.look, written.motion, metrics.get("set_aside", ())).plain()
     warn_of_losses(written.motion)
     warn_of_left_out(metrics.get("left_out", []))
     warn_of_set_aside(metrics.get("set_aside", []))

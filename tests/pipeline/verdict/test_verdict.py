@@ -116,6 +116,13 @@ def test_frames_without_a_person_are_not_lost():
     assert lost_share(motion(0.03, statuses="aaaaaaaaaa")) == 0
 
 
+@pytest.mark.parametrize(("frames", "word"), [((4, 3), "doubtful"), ((1,), "good")])
+def test_a_camera_that_was_set_aside_is_a_reason_once_and_by_name(frames, word):
+    run = motion(0.03, statuses="t" * 30)
+    aside = [{"camera": "b", "why": "late", "frames": many, "from_s": 2.25 + n, "to_s": 2.25 + n} for n, many in enumerate(frames)]
+    assert verdict_of_run(LOOK, run, aside) == (word, ("camera 'b' late from 2.2 s: check its start",))
+
+
 def test_what_the_look_found_is_among_the_reasons():
     verdict = verdict_of_run(replace(LOOK, doubts=(caution(HARMFUL, "film is noisy: use more light"),)), motion(0.03, doubtful=2))
     assert verdict == ("doubtful", ("film is noisy: use more light", "left arm doubtful in 20 % of frames"))

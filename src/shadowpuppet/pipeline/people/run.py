@@ -106,7 +106,7 @@ class PeopleRun:
         run = read_run(folder)
         recording = replace(self.rig.recording, truth=truth)
         metrics = run.metrics | evaluated(replace(self.rig, recording=recording), run.motion)
-        metrics["verdict"] = verdict_of_run(self.survey.look, run.motion).plain()
+        metrics["verdict"] = verdict_of_run(self.survey.look, run.motion, self.metrics.get("set_aside", ())).plain()
         write_metrics(folder, metrics)
         return metrics
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
+from typing import Any
 
 import numpy as np
 
@@ -16,17 +18,20 @@ from shadowpuppet.pipeline.verdict.verdict import Verdict, verdict_of
 MOSTLY_LOST = 0.5
 """Share of the frames with a person above which a run that loses them is a failure, with an exit code of its own."""
 OFTEN_LOST, OFTEN_DOUBTFUL = 0.05, 0.4
-"""Shares of frames, lost and with a doubtful limb, above which a run is doubtful."""
+"""Shares of frames, lost (or without one of the cameras) and with a doubtful limb, above which a run is doubtful."""
+REMEDIES = {"late": "check its start", "early": "check its start", "frozen": "check its cable", "blind": "look at its film"}
+"""What to do about a camera, by why it was set aside."""
 WIDE, FAR = {1: 0.105, 2: 0.05}, {1: 0.12, 2: 0.07}
 """Expected joint errors (m) above which a run is doubtful, and bad; for one camera, and for two or more."""
 MEAN_DISTANCE = 2 * np.sqrt(2 / np.pi) / np.sqrt(3)
 """Mean length of a vector of three independent normal errors, over the root of the sum of their variances."""
 
 
-def verdict_of_run(look: Look | RigLook, motion: Motion) -> Verdict:
-    """The verdict on a run of a recording, from what the look found and what the run states of itself."""
+def verdict_of_run(look: Look | RigLook, motion: Motion, aside: Sequence[Mapping[str, Any]] = ()) -> Verdict:
+    """The verdict on a run of a recording, from what the look found and what the run states of itself; `aside`: the entry `set_aside` of
+    metrics.json."""
     cameras = len(look.cameras) if isinstance(look, RigLook) else 1
-    return verdict_of([*_cautions(motion, cameras), *look.doubts])
+    return verdict_of(chain(_cautions(motion, cameras), _without_cameras(aside, len(motion)), look.doubts))
 
 
 def lost_share(motion: Motion) -> float:
@@ -43,6 +48,14 @@ def expected_error(motion: Motion) -> float:
     if not np.isfinite(lengths).any():
         return np.nan
     return float(np.where(np.isfinite(lengths), lengths, LOST_ERROR).mean())
+
+
+def _without_cameras(aside: Sequence[Mapping[str, Any]], frames: int) -> Iterator[Caution]:
+    """A reason for each camera that was set aside, and why."""
+    for camera, why in dict.fromkeys((one["camera"], one["why"]) for one in aside):
+        times = [one for one in aside if (one["camera"], one["why"]) == (camera, why)]
+        short = f"camera {camera!r} {why} from {times[0]['from_s']:.1f} s: {REMEDIES[why]}"
+        yield Caution(short, short, HARMFUL if sum(one["frames"] for one in times) > OFTEN_LOST * frames else NOTED)
 
 
 def _cautions(motion: Motion, cameras: int) -> Iterator[Caution]:

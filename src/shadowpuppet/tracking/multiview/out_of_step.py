@@ -60,7 +60,7 @@ class StepWatch:
         self._seen = deque[Seen]()
         self._verdicts = deque[tuple[str, ...]]([("",) * number] * AHEAD)
         self._gain, self._change, self._misfit = np.zeros((3, number, 2 * len(LAGS)))
-        self._out = [False] * number
+        self._out = [""] * number
 
     def __call__(self, seconds: float, masks: Sequence[Mask | None]) -> tuple[Mask | None, ...]:
         """The masks (H, W) of a frame set at a time (s), None for a camera without one or one that is out of step."""
@@ -129,6 +129,9 @@ class StepWatch:
             lag = int(np.nan_to_num(share[n], nan=-np.inf).argmax())
             against = share[n, (lag + len(LAGS)) % (2 * len(LAGS))]  # a body that jitters explains neither moment
             clear = bool(gain > LATE and alone and against < IN_STEP and explained[n, lag])
-            self._out[n] = not gain < IN_STEP if self._out[n] else clear
-        late = np.nan_to_num(share, nan=-np.inf).argmax(1) < len(LAGS)
-        return tuple(("late" if first else "early") if out else "" for out, first in zip(self._out, late))
+            if not self._out[n]:  # most cameras decide what the time is
+                clear = clear and 2 * sum(map(bool, self._out)) + 2 < len(best)
+                self._out[n] = ("late" if lag < len(LAGS) else "early") if clear else ""
+            elif gain < IN_STEP:
+                self._out[n] = ""
+        return tuple(self._out)

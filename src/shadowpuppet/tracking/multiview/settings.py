@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
@@ -56,7 +57,8 @@ class GaussNewtonSettings:
     fine_tau: Positive = 0.04
     """Distance (m) at which a point's weight is a quarter, in the fine iterations."""
     emptiness: NonNegative = 2.0
-    """Weight of the mean squared distance by which limbs reach out of the silhouettes, with fewer than six cameras."""
+    """Weight of the mean squared distance by which limbs reach out of the silhouettes, with fewer than six cameras. A quarter of it if all
+    films have lost detail to compression."""
     damping: Positive = 0.03
     """Initial damping, as a share of each DOF's curvature."""
     pull: NonNegative = 1e-5
@@ -112,7 +114,8 @@ class MultiviewSettings:
     sigma_cost: Positive = 0.003
     """sigma of eq. 29 (m): a pose that costs sigma^2 more than the best weighs 1/e."""
     silhouettes: NonNegative = 0.1
-    """Weight (m^2) of the share of pixels in which drawn body and silhouettes differ; added to the cost of the surface points."""
+    """Weight (m^2) of the share of pixels in which drawn body and silhouettes differ; added to the cost of the surface points. Half of it
+    if all films have lost detail to compression."""
     posture: NonNegative = 2e-6
     """Weight of the pull to usual postures, or those of the training motion (m^2 per squared deviation). It determines what the surface
     does not show, for example how a bend divides between pelvis and chest."""
@@ -124,6 +127,8 @@ class MultiviewSettings:
     """The estimated pose: that of the particle of greatest weight, or the weighted mean."""
     patience: NonNegative = 1.0
     """Seconds after which parts of the silhouettes that the body does not explain, such as a chair, are left out; 0: never."""
+    odd_camera: bool = True
+    """Whether a camera whose silhouette suddenly contradicts all others (late, bumped, covered) is left out while it does."""
     recover: bool = True
     """Search for the person again after a loss, a jump or an absence. The paper's filter continues from its last particles."""
     surface: SurfaceSettings = SurfaceSettings()
@@ -134,6 +139,20 @@ class MultiviewSettings:
     """Refinement by simulated forces."""
     hull: HullSettings = HullSettings()
     """How surface points are computed from the silhouettes."""
+
+
+SMEARED_EMPTINESS, SMEARED_SILHOUETTES = 0.25, 0.5
+"""Weights `emptiness` and `silhouettes` where all films have lost detail, over those where none has. Silhouettes of such films lack hands,
+forearms, now and then a leg; a body that must not reach out of them is pulled off the limbs that the other cameras show."""
+
+
+def for_smeared(settings: MultiviewSettings, share: float) -> MultiviewSettings:
+    """The settings for a rig in which a share of the films has lost detail to compression or focus."""
+    if not share:
+        return settings
+    emptiness = settings.gauss_newton.emptiness * SMEARED_EMPTINESS**share
+    return replace(settings, silhouettes=settings.silhouettes * SMEARED_SILHOUETTES**share,
+                   gauss_newton=replace(settings.gauss_newton, emptiness=emptiness))
 
 
 MULTIVIEW_PRESETS: dict[str, dict] = {
@@ -149,6 +168,7 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "silhouettes": 0.0,
         "posture": 0.0,
         "patience": 0.0,
+        "odd_camera": False,
         "surface": {"epsilon": 0.3, "tau": 0.06, "nearest": "euclidean"},
     },
 }

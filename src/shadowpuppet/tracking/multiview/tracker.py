@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -16,6 +16,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview import pose_search
 from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, half_size
+from shadowpuppet.tracking.multiview.odd_camera import adapted, odd_one, suspects
 from shadowpuppet.tracking.multiview.posture_prior import PosturePrior
 from shadowpuppet.tracking.multiview.proposals import Proposals
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refine, Refiner
@@ -31,6 +32,7 @@ from shadowpuppet.tracking.unexplained import Unexplained, look_beside
 MIN_POINTS, MIN_EXTENT = 50, 0.5
 """Smallest number and smallest extent (m) of the surface points of a person."""
 MANY_CAMERAS = 6
+NOTHING = np.zeros(0)
 PARTICLES_FEW_CAMERAS, PARTICLES_MANY_CAMERAS = 40, 16
 """Default particle numbers below and from `MANY_CAMERAS` cameras."""
 
@@ -51,6 +53,8 @@ class MultiviewState(NamedTuple):
     """`tracked`, `uncertain`, `lost` or `absent`."""
     unexplained: tuple[Unexplained | None, ...] = ()
     """What each camera's silhouettes, at half size, have beside the body; empty if nothing is left out."""
+    usual: Array = NOTHING
+    """Overlap in each camera's picture as it has been (C,), NaN without a silhouette so far; empty at the beginning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +75,8 @@ class MultiviewTracker:
     """A resampling scheme of your own, in place of the settings'."""
     looks: int = 0
     """Number of frames after which parts of the silhouettes that the body does not explain are left out; 0: never."""
+    carve: Callable[[Sequence[Mask | None]], SurfacePoints] | None = None
+    """Surface points of masks (H, W), one per camera: made anew without a camera that contradicts the others; None: all count."""
 
     def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
              also: Cost | None = None) -> MultiviewState:
@@ -79,8 +85,26 @@ class MultiviewTracker:
         If no person is visible the pose is held; after a loss the person is searched for (`recover`). `also`: a cost of your own, poses
         (N, D) to m^2 (N,), added to that of the surface.
         """
-        found = self.follow(rng, state, self.observe(state, points, masks, also))
+        observation = self.observe(state, points, masks, also)
+        found = self.follow(rng, state, observation)
+        if self.carve is not None:
+            found = self._without_odd_one(rng, state, found, observation)
         return found._replace(unexplained=self.unexplained(state.unexplained, masks, found)) if self.looks else found
+
+    def _without_odd_one(self, rng: np.random.Generator, state: MultiviewState, found: MultiviewState,
+                         observation: MultiviewObservation) -> MultiviewState:
+        """The state `found` in a frame, or that found without the one camera that contradicts the others, if there is one."""
+        assert self.carve is not None
+        masks, usual = observation.masks, state.usual
+        now, states, overlaps = observation.overlaps(found.pose, masks), dict[int, MultiviewState](), dict[int, Array]()
+        for n in suspects(usual, now):
+            rest = [None if m == n else mask for m, mask in enumerate(masks)]
+            without = MultiviewObservation(self.views, self.carve(rest), rest, observation.also, observation.left_out)
+            states[n] = self.follow(rng, state, without)
+            overlaps[n] = observation.overlaps(states[n].pose, masks)
+        odd = odd_one(usual, now, overlaps)
+        found, now = (found, now) if odd is None else (states[odd], overlaps[odd])
+        return found._replace(usual=adapted(usual, now, odd))
 
     def follow(self, rng: np.random.Generator, state: MultiviewState, observation: MultiviewObservation) -> MultiviewState:
         """The state after a frame's observation, as `step`, which makes it."""
