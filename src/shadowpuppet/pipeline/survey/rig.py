@@ -74,7 +74,7 @@ def _first_sets(rig: Rig, silhouettes: Sequence[Silhouettes], ready: bool) -> Fi
 
 def _camera_look(footage: Footage, film: FilmSurvey) -> CameraLook:
     x, y, z = footage.view.camera.centre.tolist()
-    rate = 1 / film.sample.pace if len(film.sample.times) > 1 else footage.film().rate
+    rate = 1 / film.sample.pace if len(film.sample.times) > 1 else footage.film.rate
     return CameraLook(name=footage.camera.name, place=(x, y, z), frames=footage.count, rate=rate, start=footage.view.start, **film.values)
 
 

@@ -14,9 +14,9 @@ from shadowpuppet.silhouette.background import Floats, Image, check_alike, check
 from shadowpuppet.silhouette.correction.light import Light
 from shadowpuppet.silhouette.recovery.colours import UNKNOWN, colour_model, known, log_ratio
 from shadowpuppet.silhouette.recovery.filling import filled
-from shadowpuppet.silhouette.recovery.labelling import NEVER, label_pixels
+from shadowpuppet.silhouette.recovery.labelling import NEVER, label_pixels, pair_costs
 from shadowpuppet.silhouette.recovery.legs import still_legs
-from shadowpuppet.silhouette.recovery.modes import COUNT, Modes, radius_of, temporal_modes
+from shadowpuppet.silhouette.recovery.modes import COUNT, Modes, radius_of, ranked, temporal_modes
 from shadowpuppet.silhouette.recovery.movement import Mask, Movement, find_movement, unsteady
 
 WORKED_WIDTH = 320
@@ -110,9 +110,7 @@ def _in_one_light(frames: Sequence[Image]) -> list[Image]:
 
 
 def _median(frames: Sequence[Image]) -> Image:
-    middle, rows = len(frames) // 2, 32
-    strips = (np.stack([f[y : y + rows] for f in frames]) for y in range(0, len(frames[0]), rows))
-    return np.concatenate([np.partition(strip, middle, axis=0)[middle] for strip in strips])
+    return ranked(frames, len(frames) // 2)
 
 
 def _reduced(image: Image) -> Image:
@@ -153,7 +151,7 @@ def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask]:
     cost = _costs(field, found.ratio, found.below)
     cost[..., COUNT] = np.where(covered, 0, NEVER)
     cost[covered, :COUNT] = NEVER
-    return _scene(field, label_pixels(*_on_picture(field), cost, region)[region]), covered
+    return _scene(field, label_pixels(found.between, cost, region)[region]), covered
 
 
 class _Found(NamedTuple):
@@ -168,22 +166,30 @@ class _Found(NamedTuple):
     """As `_below` finds it (M,)."""
     covered: Mask
     """Pixels (H, W) that are labelled as always covered."""
+    between: Floats
+    """Costs of neighbours' labels, of `pair_costs`."""
 
 
 def _rounds(planes: Floats, movement: Movement) -> _Found:
     """The labels after `ROUNDS` rounds on frames' planes (N, H, W, 3)."""
     modes = temporal_modes(planes[:, movement.region], radius_of(movement.noise))
-    field = _Field(modes, movement, np.median(planes, axis=0).astype(np.float32), len(planes))
-    colour, share = _on_picture(field)
+    field = _Field(modes, movement, _middle(planes), len(planes))
+    between = pair_costs(*_on_picture(field), movement.region)
     labels, ratio, below = None, np.zeros(0), np.zeros(0, bool)
     for _ in range(ROUNDS):
         below = _below(field, labels)
         ratio = _colour_ratio(field, labels, below)
-        labels = label_pixels(colour, share, _costs(field, ratio, below), movement.region)[movement.region]
+        labels = label_pixels(between, _costs(field, ratio, below), movement.region)[movement.region]
     assert labels is not None
     covered = np.zeros(movement.region.shape, bool)
     covered[movement.region] = labels == COUNT
-    return _Found(field, labels, ratio, below, covered)
+    return _Found(field, labels, ratio, below, covered, between)
+
+
+def _middle(planes: Floats) -> Floats:
+    """The median (H, W, 3) of frames' planes (N, H, W, 3), which are whole numbers."""
+    whole = planes.astype(np.uint8)
+    return (ranked(whole, (len(planes) - 1) // 2).astype(np.float32) + ranked(whole, len(planes) // 2)) / 2
 
 
 def _scene(field: _Field, labels: NDArray[np.intp]) -> Floats:
