@@ -78,7 +78,6 @@ def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film,
     from shadowpuppet.pipeline.track import look_at
 
     with terminal(quiet=as_json, verbose=verbose) as listener:
-        listener.begin("looking")
         look = look_at(recording, options_from(flags, config), listener)
         listener.look(look)
     if as_json:

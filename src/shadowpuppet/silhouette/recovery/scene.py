@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from shadowpuppet.silhouette.background import Floats, Image, check_alike, check
 from shadowpuppet.silhouette.correction.light import Light
 from shadowpuppet.silhouette.recovery.colours import UNKNOWN, colour_model, known, log_ratio
 from shadowpuppet.silhouette.recovery.filling import filled
+from shadowpuppet.silhouette.recovery.head import missing_head
 from shadowpuppet.silhouette.recovery.labelling import NEVER, label_pixels, pair_costs
 from shadowpuppet.silhouette.recovery.legs import still_legs
 from shadowpuppet.silhouette.recovery.modes import COUNT, Modes, radius_of, ranked, temporal_modes
@@ -61,6 +62,8 @@ class RecoveredScene:
     """Number of frames that it was recovered from."""
     doubt: str | None = None
     """Why it is no empty scene, and the remedy; None if nothing speaks against it."""
+    head_still: bool = False
+    """Whether the head never moves, so that the pixels where it must be count as covered."""
 
 
 def recover_scene(frames: Sequence[Image]) -> RecoveredScene:
@@ -71,7 +74,8 @@ def recover_scene(frames: Sequence[Image]) -> RecoveredScene:
     3. `modes.temporal_modes`: the colours that each of these pixels shows, with their shares.
     4. `labelling.label_pixels`: which mode is the scene's, or whether the person covers the pixel always. The first time the colours of
        the person are unknown; then `colours.log_ratio` compares what passed over the scene with the scene. If `legs.still_legs` finds
-       legs that kept still below a trunk, they are added to the pixels of step 2, and all are labelled again.
+       legs that kept still below a trunk, they are added to the pixels of step 2, and all are labelled again. Where
+       `head.missing_head` finds that a trunk has no head, the person covers the place of one.
     5. The scene's picture at full size: the mean of the frames that show the mode. Covered pixels are filled from around.
 
     Raises `SilhouetteError` for fewer than 3 frames, and frames that do not fit together.
@@ -82,8 +86,8 @@ def recover_scene(frames: Sequence[Image]) -> RecoveredScene:
     movement = find_movement(planes)
     if doubt := _doubt(movement):
         return RecoveredScene(_median(frames), np.zeros(frames[0].shape[:2], bool), len(frames), doubt)
-    scene, covered = _labelled(planes, movement)
-    return _at_full_size(frames, scene, covered, movement)
+    scene, covered, head_still = _labelled(planes, movement)
+    return replace(_at_full_size(frames, scene, covered, movement), head_still=head_still)
 
 
 def check_frames(frames: Sequence[Image]) -> None:
@@ -137,8 +141,8 @@ class _Field(NamedTuple):
     frames: int
 
 
-def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask]:
-    """The scene's Y, Cr, Cb (h, w, 3), and the pixels (h, w) that are always covered, at the reduced size."""
+def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask, bool]:
+    """The scene's Y, Cr, Cb (h, w, 3), the pixels (h, w) that are always covered, at the reduced size, and whether a head never moves."""
     radius = radius_of(movement.noise)
     found = _rounds(planes, movement)
     legs = still_legs(found.field.still, movement, found.covered)
@@ -148,10 +152,12 @@ def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask]:
     field, region = found.field, movement.region
     passing = (np.abs(planes - _scene(field, found.labels)) > radius).any(axis=3) & region
     covered = _persons_parts(found.covered, passing, region, found.ratio[:, 0])
+    head = missing_head(covered, passing)
+    covered = covered if head is None else covered | head
     cost = _costs(field, found.ratio, found.below)
     cost[..., COUNT] = np.where(covered, 0, NEVER)
     cost[covered, :COUNT] = NEVER
-    return _scene(field, label_pixels(found.between, cost, region)[region]), covered
+    return _scene(field, label_pixels(found.between, cost, region)[region]), covered, head is not None
 
 
 class _Found(NamedTuple):
