@@ -195,7 +195,8 @@ def _rounds(planes: Floats, movement: Movement) -> _Found:
 def _middle(planes: Floats) -> Floats:
     """The median (H, W, 3) of frames' planes (N, H, W, 3), which are whole numbers."""
     whole = planes.astype(np.uint8)
-    return (ranked(whole, (len(planes) - 1) // 2).astype(np.float32) + ranked(whole, len(planes) // 2)) / 2
+    lower, upper = (ranked(whole, rank).astype(np.float32) for rank in ((len(planes) - 1) // 2, len(planes) // 2))
+    return np.float32(0.5) * (lower + upper)
 
 
 def _scene(field: _Field, labels: NDArray[np.intp]) -> Floats:
