@@ -9,6 +9,7 @@ from silhouette_scenes import SIZE, empty_shots, grey, overlap, scene, shot
 
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette import learn_background, recover_scene
+from shadowpuppet.silhouette.recovery.head import missing_head
 
 TRUNK, LEGS, SKIN, POSTER = (120, 45, 40), (30, 32, 30), (90, 120, 190), (40, 200, 90)
 
@@ -73,12 +74,23 @@ def test_a_head_that_never_moves_is_the_person_s(rng):
     assert not recover_scene(film(rng, scene(rng))[0]).head_still
 
 
-def test_who_walks_is_not_given_a_head(rng):
-    """Legs that overlap in all frames are covered always, and have none above them."""
-    frames, _ = film(rng, scene(rng))
-    for n, frame in enumerate(frames):
-        frame[:95] = np.roll(frame[:95], round(25 * np.sin(0.5 * n)), axis=1)
-    assert not recover_scene(frames).head_still
+def test_only_a_trunk_that_stands_there_throughout_is_given_a_head():
+    covered, passing = np.zeros((100, 120), bool), np.zeros((20, 100, 120), bool)
+    covered[50:90, 45:75] = True
+    passing[:, 55:60, 20:100] = True
+    head = missing_head(covered, passing)
+    assert head is not None
+    rows, columns = np.nonzero(head)
+    assert 30 <= rows.min() < 38
+    assert 46 < rows.max() <= 52
+    assert abs(columns.mean() - 59.5) < 1
+    seen = passing.copy()
+    seen[:, 34:50, 54:66] = True  # the head, which moves
+    assert missing_head(covered, seen) is None
+    for n, frame in enumerate(passing):  # who walks, so that only a little is covered always
+        frame[5:95, 5 * n : 5 * n + 40] = True
+    assert missing_head(covered & (np.arange(100)[:, None] > 75), passing) is None
+    assert missing_head(np.roll(covered, -45, axis=0), np.roll(seen, -45, axis=0) & False) is None  # above the picture
 
 
 def test_the_gap_between_the_legs_is_scene(rng):
