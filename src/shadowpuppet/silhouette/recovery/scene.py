@@ -20,8 +20,8 @@ from shadowpuppet.silhouette.recovery.legs import still_legs
 from shadowpuppet.silhouette.recovery.modes import COUNT, Modes, radius_of, ranked, temporal_modes
 from shadowpuppet.silhouette.recovery.movement import Mask, Movement, find_movement, unsteady
 
-WORKED_WIDTH = 320
-"""Greatest width, pixels, of the pictures in which scene and person are separated; the scene's own picture has the frames' size."""
+WORKED_WIDTH, WORKED_AREA = 320, 320 * 240
+"""Greatest width and area, pixels, of the pictures in which scene and person are separated; the scene's own picture has the frames' size."""
 LEAST_FRAMES = 3
 """Least number of frames: with fewer, moving and still pixels cannot be distinguished."""
 LEAST_SEEN = 2
@@ -121,9 +121,10 @@ def _reduced(image: Image) -> Image:
     import cv2
 
     height, width = image.shape[:2]
-    if width <= WORKED_WIDTH:
+    scale = min(WORKED_WIDTH / width, (WORKED_AREA / (width * height)) ** 0.5)
+    if scale >= 1:
         return image
-    size = WORKED_WIDTH, max(1, round(height * WORKED_WIDTH / width))
+    size = max(1, round(width * scale)), max(1, round(height * scale))
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
