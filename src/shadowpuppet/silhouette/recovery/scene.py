@@ -21,7 +21,7 @@ from shadowpuppet.silhouette.recovery.modes import COUNT, Modes, radius_of, rank
 from shadowpuppet.silhouette.recovery.movement import Mask, Movement, find_movement, unsteady
 
 WORKED_WIDTH, WORKED_AREA = 320, 320 * 240
-"""Greatest width and area, pixels, of the pictures in which scene and person are separated; the scene's own picture has the frames' size."""
+"""Greatest width and area, pixels, of the pictures in which scene and person are separated; the scene's own has the frames' size."""
 LEAST_FRAMES = 3
 """Least number of frames: with fewer, moving and still pixels cannot be distinguished."""
 LEAST_SEEN = 2
