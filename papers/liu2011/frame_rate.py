@@ -68,7 +68,7 @@ def chain(case: Case) -> dict[str, Contender]:
 
 def decode(case: Case) -> None:
     """Read some frames of the film."""
-    for _ in zip(range(FRAMES), case.footage.film()):
+    for _ in zip(range(FRAMES), case.footage.film):
         pass
 
 

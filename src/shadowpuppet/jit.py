@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import event
 
 BLOCK = 32
 """Poses side by side in memory, so that one instruction works on eight (AVX-512) or four (AVX2) of them."""
@@ -45,7 +44,24 @@ reduction_kernel = compiled(**KERNEL_OPTIONS, fastmath=REDUCTION_MATH)
 """Kernel of sums over finite numbers, lane by lane."""
 
 
-def is_compiled() -> bool:
-    """Whether kernels of the package were compiled before, and kept on disk; the first time takes a minute or more."""
-    place = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(__file__).parent)
-    return next(place.rglob("*.nbi"), None) is not None
+class _Compiling(event.Listener):
+    """Counts the kernels that are being compiled now; those that are read from the disk are not."""
+
+    number = 0
+
+    def on_start(self, event: Any) -> None:
+        """One begins."""
+        self.number += 1
+
+    def on_end(self, event: Any) -> None:
+        """One ends."""
+        self.number -= 1
+
+
+_COMPILING = _Compiling()
+event.register("numba:compile", _COMPILING)
+
+
+def is_compiling() -> bool:
+    """Whether a kernel is being compiled now; the first time all of them take a minute or more, and are kept on disk."""
+    return _COMPILING.number > 0

@@ -18,7 +18,9 @@ from pathlib import Path
 import made
 import numpy as np
 import pytest
+from numba.core import event
 
+from shadowpuppet import jit
 from shadowpuppet.cli import app as cli
 from shadowpuppet.cli import terminal as terminal_module
 from shadowpuppet.errors import PERSON_LOST
@@ -152,6 +154,20 @@ def test_progress_is_printed_where_there_is_no_terminal(capsys, monkeypatch):
         listener.begin("tracking")
         time.sleep(0.1)
     assert capsys.readouterr().err == ""
+
+
+def test_compiling_is_said_while_it_lasts(capsys, monkeypatch):
+    monkeypatch.setattr(terminal_module, "LOG_EVERY", 0.02)
+    with terminal_module.terminal() as listener:
+        listener.begin("measuring the person")
+        time.sleep(0.1)
+        with event.trigger_event("numba:compile", data={}):
+            assert jit.is_compiling()
+            time.sleep(0.1)
+        assert not jit.is_compiling()
+    lines = capsys.readouterr().err.splitlines()
+    assert not lines[0].endswith("(a minute or two)")
+    assert lines[-1] == "... measuring the person, 0 s, compiling, once (a minute or two)"
 
 
 def test_quiet_is_quiet(shell, recording):

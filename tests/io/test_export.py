@@ -82,6 +82,20 @@ def test_every_format_of_a_run_has_the_runs_joints(shell, run, tmp_path):
     assert "3 of 40 frames are not known: the puppet is hidden" in err
 
 
+def test_a_floor_that_is_not_at_0_is_put_there(shell, tmp_path):
+    run = runs.make_run(tmp_path / "run", "rounded", frames=12)
+    before, level = read_run(run).motion.joints, -1.25
+    export_run(run, ["bvh"], tmp_path / "before")
+    with (run / "run.toml").open("a") as file:
+        file.write(f'\n[floor]\nheight_m = {level}\nfrom = "the lowest foot over the film"\n')
+    code, out, _ = shell("export", run, "--to", "npz,trc,glb,bvh,c3d", "-o", tmp_path / "out")
+    assert code == 0
+    assert "1.25 m below the camera" in out
+    np.testing.assert_allclose(read_motion_npz(tmp_path / "out" / "run.npz").joints[..., 2], before[..., 2] - level, atol=1e-6)
+    roots = [np.array((tmp_path / folder / "run.bvh").read_text().splitlines()[-1].split()[:3], float) for folder in ("before", "out")]
+    np.testing.assert_allclose(np.sort(np.abs(roots[1] - roots[0])), [0, 0, -level], atol=1e-4)
+
+
 def test_by_default_files_lie_in_the_run_and_a_new_run_may_replace_it(shell, whole, tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(whole, folder)

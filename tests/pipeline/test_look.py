@@ -10,15 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
+from shadowpuppet.errors import HARMFUL, RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
 from shadowpuppet.pipeline.footage import FIRST, FIRST_SECONDS, LOOKED_AT, RUN, RUNS, _spread, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import DEEP, _doubts, _forearms_seen, wrong_posture
 from shadowpuppet.pipeline.rig import open_rig
-from shadowpuppet.pipeline.silhouettes import clean_silhouettes, learn_silhouettes, read_masks
+from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes, read_masks
 from shadowpuppet.pipeline.survey.camera import _look
+from shadowpuppet.pipeline.survey.cautions import recovery_cautions
 from shadowpuppet.pipeline.survey.film import quality_of, survey_film
 from shadowpuppet.pipeline.track import MONOCULAR, Prepared, json_text, look_at, prepare, track_recording
+from shadowpuppet.silhouette import RecoveredScene
 from shadowpuppet.silhouette.quality import mask_quality
 from shadowpuppet.tracking.monocular.initialization import POSTURES, PersonEstimate, SizeFit, sizes_from_height
 
@@ -180,6 +182,12 @@ def test_a_guessed_camera_is_said(recording, tmp_path):
     film = look_at(recording / "video" / "cam.mp4", make_options(values))
     assert film.background == "background/cam.mp4"
     assert film.person["source"].startswith("proportions")
+
+
+def test_a_head_that_never_moves_makes_a_recording_doubtful():
+    scene = RecoveredScene(np.zeros((4, 4), np.uint8), np.ones((4, 4), bool), 60, head_still=True)
+    (said, _) = recovery_cautions(["cam"], [Silhouettes("the film", None, recovered=scene)])
+    assert (said.weight, said.short) == (HARMFUL, "head never moves: film the empty scene")
 
 
 def test_a_scene_taken_from_the_film_is_said(recording, tmp_path):

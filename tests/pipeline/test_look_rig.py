@@ -17,7 +17,7 @@ from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.pipeline.look import RigLook
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.progress import json_text
+from shadowpuppet.pipeline.progress import Listener, json_text
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.pipeline.track import look_at, track_recording
@@ -55,6 +55,24 @@ def test_a_look_is_plain(recording):
     told = json.loads(json_text(looked(recording)))
     assert told["agreement"]["names"] == ["cam1", "cam2", "cam3", "cam4"]
     assert told["cameras"][0]["quality"]["empty"] == 0
+
+
+def test_each_step_is_named_with_its_camera(recording):
+    class Told(Listener):
+        def __init__(self) -> None:
+            self.told = list[str]()
+
+        def begin(self, what: str, total: int | None = None) -> None:
+            self.told.append(what)
+
+    listener = Told()
+    survey_rig(open_rig(recording, Options()), Options(), listener=listener)
+    for camera in ("cam1", "cam2", "cam3", "cam4"):
+        for step in ("reading the film", "learning the empty scene, making silhouettes", "judging the silhouettes"):
+            assert any(f"camera {camera}: {step}" in told for told in listener.told)
+    assert listener.told[-1] == "looking: do the cameras agree"
+    assert all(told.startswith("looking") for told in listener.told)
+    assert any(told.startswith("looking (3 of 4 films done): camera") for told in listener.told)
 
 
 def test_the_opening_is_spread_over_the_first_seconds(recording):

@@ -63,7 +63,7 @@ def film(request, recording, tmp_path_factory):
     rig = open_rig(recording, options)
     survey = kind.survey(rig, options)
     subject = replace(kind.fit(np.random.default_rng(1), survey, options), beside=())
-    known = kind._replace(survey=lambda *_: survey, fit=lambda *_: subject)
+    known = kind._replace(survey=lambda *_, **__: survey, fit=lambda *_: subject)
 
     def track(folder, listener=None, resume=False, **changed):
         return run(rig, known, folder, replace(options, **changed), listener or Listener(), resume=resume)

@@ -343,10 +343,11 @@ def test_memory_does_not_grow_with_the_film(recording):
     footage, peaks = open_footage(recording, Options()), []
     shots = list(footage.frames(ready=False))
     for times in (4, 16):
-        longer, film = replace(footage), replace(footage.film(), count=times * len(shots))
+        longer, film = replace(footage), replace(footage.film, count=times * len(shots))
         long = [shot._replace(time=n / 10) for n, shot in enumerate(shots * times)]
-        object.__setattr__(longer, "film", lambda film=film: film)
-        object.__setattr__(longer, "frames", lambda ready, strict, long=long: (shot._replace(image=shot.image.copy()) for shot in long))
+        object.__setattr__(longer, "film", film)
+        object.__setattr__(longer, "frames", lambda ready, strict, wanted, long=long: (shot._replace(image=shot.image.copy())
+                                                                                       for shot in long if wanted(shot.time)))
         tracemalloc.start()
         sample = take_sample(longer)
         peaks.append(tracemalloc.get_traced_memory()[1])

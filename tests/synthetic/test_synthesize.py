@@ -312,7 +312,8 @@ def test_flags_seat_a_person_on_a_chair_without_an_empty_scene(shell, tmp_path):
 def test_a_ring_has_training_motion_and_no_references(shell, tmp_path):
     code, out, err = shell("-o", "ring", "--cameras", 3, "--ring-radius", 3, "--seed", 4, "--motion", "random", *TINY)
     assert (code, err) == (0, "")
-    assert "shadowpuppet info ring --camera cam1" in out
+    assert "shadowpuppet track ring --overlay" in out
+    assert "--camera" not in out  # all are tracked
     recording = read_recording(tmp_path / "ring")
     assert [view.camera.name for view in recording.views] == ["cam1", "cam2", "cam3"]
     assert recording.references == ()

@@ -95,7 +95,10 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
         listener.begin("exporting")
         written = export_run(run, names, folder, unit, missing, model, weight)
     if not quiet:
-        show(pairs([("made", "\n".join(map(str, written)))]))
+        level = read_run(run).floor
+        side = "below" if level < 0 else "above"
+        floor = f"{abs(level):.2f} m {side} the camera, where the lowest foot over the film is; at 0 in these files"
+        show(pairs([("made", "\n".join(map(str, written))), ("floor", floor if level else None)]))
 
 
 def convert(source: Annotated[Path, Parameter(help=f"File of motion: {choices(READABLE)}; .amc with its .asf beside it.")],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -78,7 +79,6 @@ def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film,
     from shadowpuppet.pipeline.track import look_at
 
     with terminal(quiet=as_json, verbose=verbose) as listener:
-        listener.begin("looking")
         look = look_at(recording, options_from(flags, config), listener)
         listener.look(look)
     if as_json:
@@ -208,7 +208,7 @@ def _recording_table(spec: Spec, recording: Recording) -> Any:
     views, seconds, path = spec.views(), sum(gesture.seconds for gesture in spec.motion), recording.path
     first, cameras = views[0], f"{len(views)} cameras" if len(views) > 1 else "1 camera"
     extras = [thing.kind for thing in spec.scene.obstacles] + ["another person"] * len(spec.scene.bystanders)
-    one_camera = f" --camera {first.name}" if len(views) > 1 else ""
+    program = os.environ.get("SHADOWPUPPET_COMMAND", "shadowpuppet")
     also = {"people/, truth_1.csv, ...": spec.scene.bystanders, "training.csv, training.trc": recording.training,
             "references/": recording.references}
     return pairs([
@@ -217,9 +217,9 @@ def _recording_table(spec: Spec, recording: Recording) -> Any:
         ("films", f"{cameras}, {first.size[0]} x {first.size[1]} pixels, {spec.rate:g} frames/s, {seconds:g} s of motion"),
         *([("faults", ", ".join(dict.fromkeys(fault.kind for fault in spec.faults)))] if spec.faults else []),
         ("truth", ", ".join(["truth.csv, truth.trc, masks/", *(name for name, there in also.items() if there)])),
-        ("again", f"shadowpuppet synthesize {path}/spec.toml -o FOLDER"),
-        ("look", f"shadowpuppet info {path}{one_camera}"),
-        ("track", f"shadowpuppet track {path} --overlay{one_camera}"),
+        ("again", f"{program} synthesize {path}/spec.toml -o FOLDER"),
+        ("look", f"{program} info {path}"),
+        ("track", f"{program} track {path} --overlay"),
     ])  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import warnings
 from collections.abc import Iterator
@@ -11,7 +12,8 @@ from time import monotonic
 from typing import TextIO
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, Task, TaskID, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
 from shadowpuppet.cli.look_tables import look_table
 from shadowpuppet.cli.tables import show, verdict_table
@@ -52,7 +54,21 @@ class _Log:
         while not end.wait(LOG_EVERY):
             seconds = monotonic() - self.began
             count = f" {self.done}{f'/{self.total}' if self.total else ''}, {self.done / seconds:.1f} a second" if self.done else ""
-            self.console.print(f"{PROGRESS} {self.what}{count}, {seconds:.0f} s", markup=False, soft_wrap=True)
+            self.console.print(f"{PROGRESS} {self.what}{count}, {seconds:.0f} s{_compiling()}", markup=False, soft_wrap=True)
+
+
+def _compiling() -> str:
+    """That code is being compiled, in words; empty if none is."""
+    jit = sys.modules.get("shadowpuppet.jit")  # not imported for this: that takes a second
+    return ", compiling, once (a minute or two)" if jit is not None and jit.is_compiling() else ""
+
+
+class _What(TextColumn):
+    """What is being done, and that code is being compiled for it."""
+
+    def render(self, task: Task) -> Text:
+        """Drawn anew with each refresh."""
+        return Text(task.description + _compiling())
 
 
 class Terminal(LiveListener):
@@ -62,7 +78,7 @@ class Terminal(LiveListener):
         """`quiet`: show only warnings; `verbose`: also all that a look found."""
         self.quiet, self.verbose, self.frames = quiet, verbose, 0
         self.console = Console(stderr=True, highlight=False)
-        self._progress = Progress(TextColumn("{task.description}"), BarColumn(30), TextColumn("{task.fields[done]}"),
+        self._progress = Progress(_What(""), BarColumn(30), TextColumn("{task.fields[done]}"),
                                   TimeRemainingColumn(), console=self.console, transient=True,
                                   disable=quiet or not self.console.is_terminal)
         self._log = None if quiet or self.console.is_terminal else _Log(self.console)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -88,9 +88,9 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
                missing: str = "nan", model: str = "rajagopal", weight: float | None = None) -> list[Path]:
     """Write a run's motion as `<run>.<format>` for each of `formats`; returns the files' paths.
 
-    A killed run is exported up to its last frame. Warns of data that a format cannot hold. Raises a `ShadowPuppetError` for an
-    unknown format, or a run that cannot be read, has no frame, or has no person.toml although a format needs the body; files already
-    written stay.
+    The floor is at 0: a run whose world has it elsewhere (`Run.floor`) is raised. A killed run is exported up to its last frame. Warns of
+    data that a format cannot hold. Raises a `ShadowPuppetError` for an unknown format, or a run that cannot be read, has no frame, or has
+    no person.toml although a format needs the body; files already written stay.
 
     Args:
         folder: the run.
@@ -105,7 +105,7 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
     if unknown or not formats:
         raise SettingsError(f"formats: found {unknown[0] if unknown else 'none'!r}, expected some of {choices(EXPORTS)}")
     layout = Layout.checked(unit, missing, model, weight)
-    export = _RunExport(read_run(folder), layout)
+    export = _RunExport(_on_floor(read_run(folder)), layout)
     if not np.isfinite(export.run.motion.joints).all(2).any():
         raise ShadowPuppetError(f"{folder}: found no frame with a known joint, expected one at least")
     target = _made(Path(folder) / "export" if out is None else Path(out))
@@ -114,6 +114,12 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
         written.append(target / f"{Path(folder).resolve().name}.{name}")
         FORMATS[name].write_run(export, written[-1])
     return written
+
+
+def _on_floor(run: Run) -> Run:
+    """A run with its joints in a world whose floor is at 0."""
+    motion = run.motion
+    return replace(run, motion=replace(motion, joints=motion.joints - [0, 0, run.floor])) if run.floor else run
 
 
 def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = False, rate: float | None = None, unit: float | None = None,

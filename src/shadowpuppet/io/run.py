@@ -6,7 +6,8 @@
     contacts.csv   time, height of the floor (m), <point>_contact and <point>_probability of heels and toes (`io.contacts`)
     motion.npz     the fields of `Motion`, arrays only
     raw.csv        joints.csv and angles.csv as they were tracked, if they were smoothed afterwards; then run.toml has [smoothing]
-    run.toml       complete, frames, body, versions, and what the tracker adds: recording, method, seed, settings, sizes, ...
+    run.toml       complete, frames, body, versions, and what the tracker adds: recording, method, seed, settings, sizes, ...; [floor] with
+                   its height in the world (m) where that is not 0, as before a camera of which only the field of view is known
     metrics.json   complete, frames, status (number of frames of each), limb_status (likewise, by limb), timings, errors, ...
 
 The tables grow with every frame; the other files are written at the end, also after an error. `complete` in run.toml says whether all
@@ -57,6 +58,12 @@ class Run:
     def settings(self) -> dict[str, Any]:
         """The settings of the run."""
         return self.info.get("settings", {})
+
+    @property
+    def floor(self) -> float:
+        """Height of the floor in the world, metres: 0 unless run.toml says otherwise."""
+        found = self.info.get("floor", {})
+        return float(found.get("height_m", 0.0)) if isinstance(found, dict) else 0.0
 
 
 def read_run(folder: str | Path) -> Run:

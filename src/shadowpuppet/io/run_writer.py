@@ -238,7 +238,7 @@ class RunWriter:
         import tomli_w
 
         ours = tomllib.loads(tomli_w.dumps(self.info))
-        for key in sorted((earlier.keys() | ours.keys()) - {"complete", "frames", "smoothing"}):
+        for key in sorted((earlier.keys() | ours.keys()) - {"complete", "frames", "smoothing", "floor"}):
             if difference := _difference(key, earlier.get(key), ours.get(key)):
                 raise ShadowPuppetError(f"{self.folder}: the run there cannot go on as another one: {difference}")
         if earlier["complete"]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import islice
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, 
 from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video import FrameSource, Image, camera_number, open_frames
-from shadowpuppet.video.frames import ROUNDING
+from shadowpuppet.video.frames import ROUNDING, Wanted
 from shadowpuppet.video.moments import span_of
 from shadowpuppet.video.seeking import Seeker
 
@@ -52,31 +52,43 @@ class Footage:
     region: tuple[slice, slice] | None = None
     """Rows and columns where the person may be; None for all."""
 
+    @cached_property
     def film(self) -> FrameSource:
-        """Opens the film; iterating over it gives its frames."""
+        """The film; iterating over it gives its frames."""
         return open_frames(self.view.video, size=self.camera.size, rate=self.recording.rate)
 
-    def frames(self, ready: bool, strict: bool = True) -> Iterator[CameraFrame]:
-        """The film's frames from the recording's begin on; with `ready`, the ready silhouettes too.
+    def frames(self, ready: bool, strict: bool = True, wanted: Wanted = lambda _: True) -> Iterator[CameraFrame]:
+        """The film's frames from the recording's begin on; with `ready`, the ready silhouettes too. `wanted`: whether a frame is, asked
+        once for each, in order, with its time (s); pictures of others are not made.
 
-        Raises `SilhouetteError` if these end before the film does; if not `strict`, later frames have None instead.
+        Raises `SilhouetteError` if the silhouettes end before the film does; if not `strict`, later frames have None instead.
         """
-        masks = iter(open_frames(self.view.masks, size=self.camera.size)) if ready and self.view.masks else None
         start, begin, end = self.view.start, self.recording.begin, self.recording.duration
-        passed_over = 0.0 if masks is not None else start + begin - ROUNDING  # masks have no times: they are counted with the frames
-        for n, frame in enumerate(self.film().read(passed_over)):
-            mask, time = None if masks is None else next(masks, None), frame.time - start
-            if masks is not None and mask is None and strict:
-                raise SilhouetteError(f"{self.view.masks}: found {n} silhouettes, expected one for each frame of {self.view.video}")
-            if end is not None and time > end - ROUNDING:
+        read, passed = 0, 0  # masks have no times: they are counted with the frames
+
+        def of_film(time: float) -> bool:
+            nonlocal read
+            read, time = read + 1, time - start
+            return time > begin - ROUNDING and ((end is not None and time > end - ROUNDING) or wanted(max(time, 0.0)))
+
+        def of_masks(_: float) -> bool:
+            nonlocal passed
+            passed += 1
+            return passed == read
+
+        masks = open_frames(self.view.masks, size=self.camera.size).read(of_masks) if ready and self.view.masks else None
+        for frame in self.film.read(of_film):
+            if end is not None and frame.time - start > end - ROUNDING:
                 return
-            if time > begin - ROUNDING:
-                yield CameraFrame(max(time, 0.0), frame.image, None if mask is None else mask.image)
+            mask = None if masks is None else next(masks, None)
+            if masks is not None and mask is None and strict:
+                raise SilhouetteError(f"{self.view.masks}: found {passed} silhouettes, expected one for each frame of {self.view.video}")
+            yield CameraFrame(max(frame.time - start, 0.0), frame.image, None if mask is None else mask.image)
 
     @property
     def count(self) -> int | None:
         """Number of `frames`, from the film's header; None if that does not state it."""
-        film = self.film()
+        film = self.film
         if film.count is None or not np.isfinite(film.rate):
             return film.count
         first = int(np.ceil((self.view.start + self.recording.begin - ROUNDING) * film.rate))
@@ -220,26 +232,32 @@ class Sample:
 def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKED_AT) -> Sample:
     """Sample the film's first `longest` frames, reading them once. With `need_masks`, raises `SilhouetteError` if ready silhouettes are
     missing."""
-    film = footage.film()
+    film = footage.film
     length = footage.count or (film.duration * film.rate if np.isfinite(film.duration * film.rate) else LOOKED_AT)
     wanted = _spread(min(int(length), longest))
     runs: dict[int, list[CameraFrame]] = {}
     first, times, begin = list[CameraFrame](), list[float](), footage.recording.begin
     next_first = begin
-    for n, frame in enumerate(islice(footage.frames(ready=True, strict=need_masks), longest)):
-        times.append(frame.time)
-        if n in wanted:
+
+    def kept(time: float) -> bool:
+        times.append(time)
+        return len(times) - 1 in wanted or next_first <= time <= begin + FIRST_SECONDS or len(times) == longest
+
+    for frame in footage.frames(ready=True, strict=need_masks, wanted=kept):
+        if (n := len(times) - 1) in wanted:
             runs.setdefault(wanted[n], []).append(frame)
         if next_first <= frame.time <= begin + FIRST_SECONDS:
             first.append(frame)
             next_first = frame.time + 0.99 * FIRST_SECONDS / FIRST
+        if len(times) == longest:
+            break
     return Sample(list(runs.values()), list(runs), first, np.array(times))
 
 
 def spread_frames(footage: Footage, number: int = SPREAD) -> list[Image]:
     """`number` images spread over the whole film, or all if there are fewer, found by seeking; none if the film does not state its
     length."""
-    film, length = footage.film(), footage.count
+    film, length = footage.film, footage.count
     if length is None or not np.isfinite(film.rate):
         return []
     wanted = np.unique(np.linspace(0, max(length - 1, 0), number).round())

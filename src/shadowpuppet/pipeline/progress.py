@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -49,6 +50,24 @@ class Listener:
 
     def look(self, look: Look | RigLook) -> None:
         """The examination of the recording is done; tracking follows."""
+
+
+class Steps:
+    """Names, for a listener, what a look is doing: with each of the cameras that are looked at in parallel. For several threads."""
+
+    def __init__(self, listener: Listener | None, names: Sequence[str]) -> None:
+        """`names`: of all cameras."""
+        self.listener, self.names, self.now, self.lock = listener or Listener(), tuple(names), dict[str, str](), threading.Lock()
+
+    def __call__(self, what: str, camera: str | None = None) -> None:
+        """A step begins, of a `camera` or of all; no words: a camera's last one is done."""
+        with self.lock:
+            self.now = self.now if camera else {}
+            self.now[camera or ""] = what
+            told = "; ".join(f"camera {name}: {step}" if name else step for name, step in self.now.items() if step)
+            done = sum(not step for step in self.now.values())
+            films = f" ({done} of {len(self.names)} films done)" if camera and len(self.names) > 1 else ""
+            self.listener.begin(f"looking{films}: {told}" if told else f"looking{films}")
 
 
 @dataclass(frozen=True, eq=False)

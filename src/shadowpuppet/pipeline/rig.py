@@ -73,7 +73,7 @@ class Rig:
     @cached_property
     def rates(self) -> tuple[float, ...]:
         """Frames/s of the films; an assumed rate for those that do not state it."""
-        stated = (footage.film().rate for footage in self.footage)
+        stated = (footage.film.rate for footage in self.footage)
         return tuple(rate if math.isfinite(rate) else ASSUMED_RATE for rate in stated)
 
     @property

@@ -14,12 +14,15 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.sizes import CardboxSizes
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Bits
 from shadowpuppet.errors import Caution
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person
-from shadowpuppet.motion.motion import BLANK, MotionFrame
+from shadowpuppet.motion.contact.floor import under_feet
+from shadowpuppet.motion.motion import BLANK, Motion, MotionFrame
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.tracking.doubt.doubt import Doubt
@@ -160,3 +163,14 @@ def joint_names(body: Body) -> list[str]:
 def average_body(name: str) -> Body:
     """A body model of average sizes, used before the person's sizes are known."""
     return make_body(name, average_sizes(name, AVERAGE_HEIGHT))
+
+
+def floor_entry(motion: Motion, cameras: Sequence[Camera], person: Person) -> dict[str, Any]:
+    """The entry `floor` of run.toml of a run whose only camera is known by its field of view alone, so that the world does not have its
+    floor at 0: exports put it there. Empty for others."""
+    if len(cameras) > 1 or cameras[0].oriented:
+        return {}
+    sizes, height = person.sizes, person.height or AVERAGE_HEIGHT
+    above = sizes.head_height + sizes.neck_gap + sizes.torso_height if isinstance(sizes, CardboxSizes) else 0.0
+    level = under_feet(motion.joint_names, motion.joints, height - above)
+    return {"floor": {"height_m": round(level, 4), "from": "the lowest foot over the film"}} if np.isfinite(level) else {}

@@ -6,6 +6,7 @@ import time
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 from warnings import warn
@@ -17,7 +18,6 @@ from shadowpuppet.io.people import person_folder
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter, write_metrics
-from shadowpuppet.jit import is_compiled
 from shadowpuppet.motion.motion import BLANK, Motion, MotionFrame
 from shadowpuppet.pipeline.look import Look, RigLook, Survey
 from shadowpuppet.pipeline.options import Options, plain_options
@@ -47,7 +47,7 @@ from shadowpuppet.pipeline.progress import (
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig, read_frames
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
-from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names, motion_frame
+from shadowpuppet.pipeline.subject import TrackedSubject, average_body, floor_entry, joint_names, motion_frame
 from shadowpuppet.pipeline.survey.camera import survey_camera
 from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
@@ -111,7 +111,7 @@ def look_at(recording: str | Path, options: Options | None = None, listener: Lis
     kind = kind_of(rig)
     if kind.look_fits:
         return prepare(generators(options)[0], rig, options, kind, listener=listener).look
-    return kind.survey(rig, options).look
+    return kind.survey(rig, options, listener=listener).look
 
 
 @one_blas_thread()
@@ -152,8 +152,8 @@ def kind_of(rig: Rig) -> Kind:
 
 def look_around(rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None, listener: Listener | None = None) -> Survey:
     """Survey a recording. Raises a `ShadowPuppetError` if something cannot be used."""
-    (listener or Listener()).begin(f"looking at {len(rig.footage)} film{'s' if rig.is_multiview else ''}")
-    return kind.survey(rig, options) if cache is None else cache.survey(rig, options, kind.survey)
+    survey = partial(kind.survey, listener=listener)
+    return survey(rig, options) if cache is None else cache.survey(rig, options, survey)
 
 
 def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None,
@@ -167,24 +167,25 @@ def _fitted(rng: np.random.Generator, survey: Survey, options: Options, kind: Ki
     """The surveyed recording and the person in it."""
     if survey.look.refusal is not None and not options.anyway:
         return Prepared(survey, None, survey.look)
-    listener.begin("measuring the person" if is_compiled() else "compiling, once (a minute or two), and measuring the person")
+    listener.begin("measuring the person")
     subject = kind.fit(rng, survey, options)
     for _ in range(LOOKS_AGAIN):
-        again = _looked_again(survey, subject, options, kind)
+        again = _looked_again(survey, subject, options, kind, listener)
         if again is None:
             break
+        listener.begin("measuring the person again: what belongs to the scene is left out now")
         survey, subject = again, kind.fit(rng, again, options)
         if cache is not None:
             cache.keep(survey)
     return Prepared(survey, subject, survey.look_with(subject.summary, subject.doubts))
 
 
-def _looked_again(survey: Survey, subject: TrackedSubject, options: Options, kind: Kind) -> Survey | None:
+def _looked_again(survey: Survey, subject: TrackedSubject, options: Options, kind: Kind, listener: Listener) -> Survey | None:
     """The survey in which what never moves, and the fitted body leaves unexplained, belongs to the scene; None if there is nothing."""
     if all(each is None for each in subject.beside):
         return None
     hints = tuple(SceneHint(beside, each.added) for beside, each in zip(subject.beside, survey.silhouettes, strict=True))
-    again = kind.survey(survey.rig, options, hints)
+    again = kind.survey(survey.rig, options, hints, listener)
     more = any(new.added is not old.added for new, old in zip(again.silhouettes, survey.silhouettes))
     return again if more and again.look.refusal is None else None
 
@@ -209,6 +210,7 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         _check_cutoff(options, prepared.look.rate)
         leans = _track(writer, prepared, kind, options, listener, for_track, cache)
         smooth_run(writer, [(0, prepared.check())], options, listener, writer.motion, leans)
+        writer.info |= floor_entry(writer.motion, rig.cameras, prepared.check().person)
     written = read_run(folder)
     metrics = written.metrics | evaluated(rig, written.motion)
     metrics["verdict"] = verdict_of_run(prepared.look, written.motion, metrics.get("set_aside", ())).plain()

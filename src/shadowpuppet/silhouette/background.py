@@ -22,6 +22,8 @@ less."""
 WHITE_SHARE = 0.7
 """Share of the noise that this smoothing leaves, below which it is a sensor's: independent from pixel to pixel. Compression's is not."""
 
+EXACT = 256
+"""Number of pictures whose squares' sum a float32 holds exactly: accumulating takes half the time of float64."""
 UNLIKE = 8.0
 """Median difference of a frame from the empty scene, over that of the film's better frames, from which on it does not show the scene."""
 
@@ -74,32 +76,40 @@ def learn_statistics(images: Iterable[Image], observe: Callable[[Image], object]
 
 
 class _Sums:
-    """Running sums; exact, since pixels are integers."""
+    """Running sums of `EXACT` pictures at a time, and of all before; exact, since pixels are integers."""
 
     def __init__(self, image: Image) -> None:
         self.shape, self.frames = image.shape, 0
         flat, deep = image.shape[:2], (*image.shape[:2], 3)
-        self.grey, self.planes, self.smooth = ([np.zeros(s), np.zeros(s)] for s in (flat, deep, deep))
+        self.now, self.sums = ([np.zeros(shape, kind) for shape in (flat, flat, deep, deep, deep)] for kind in (np.float32, np.float64))
 
     def add(self, image: Image) -> None:
         import cv2
 
         self.frames += 1
-        planes = to_planes(image)
-        channels = [(self.grey, to_brightness(image)), (self.planes, planes), (self.smooth, smoothed(planes))]
-        for (first, second), values in channels:
+        grey, planes = to_brightness(image), to_planes(image)
+        smooth = smoothed(planes)
+        for values, first in ((grey, self.now[0]), (planes, self.now[2]), (smooth, self.now[3])):
             cv2.accumulate(values, first)
+        for values, second in ((grey, self.now[1]), (smooth, self.now[4])):
             cv2.accumulateSquare(values, second)
+        if self.frames % EXACT == 0:
+            self._flush()
+
+    def _flush(self) -> None:
+        for total, now in zip(self.sums, self.now):
+            total += now
+            now[:] = 0
 
     def statistics(self) -> Background:
-        def moments(sums: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-            first, second = sums
-            variance = np.maximum(self.frames * second - first**2, 0) / self.frames**2
-            return first / self.frames, np.sqrt(variance)
+        self._flush()
+        grey, grey_squares, planes, smooth, smooth_squares = self.sums
 
-        brightness, sigma = moments(self.grey)
-        return Background(self.frames, len(self.shape) == 3, brightness, sigma, moments(self.planes)[0].astype(np.float32),
-                          moments(self.smooth)[1].astype(np.float32))
+        def deviation(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+            return np.sqrt(np.maximum(self.frames * second - first**2, 0) / self.frames**2)
+
+        return Background(self.frames, len(self.shape) == 3, grey / self.frames, deviation(grey, grey_squares),
+                          (planes / self.frames).astype(np.float32), deviation(smooth, smooth_squares).astype(np.float32))
 
 
 class FrameSampler:

@@ -12,7 +12,7 @@ import numpy as np
 from shadowpuppet.errors import VideoError
 from shadowpuppet.video.camera_device import camera_number, open_camera
 from shadowpuppet.video.film import FILM_SUFFIXES, open_film
-from shadowpuppet.video.frames import Frame, FrameSource, Image, Size
+from shadowpuppet.video.frames import Frame, FrameSource, Image, Size, Wanted
 from shadowpuppet.video.images import IMAGE_SUFFIXES, open_folder, open_picture, read_image, write_image
 from shadowpuppet.video.writer import FrameWriter, write_frames
 
@@ -57,8 +57,8 @@ def _scaled(frames: FrameSource, size: Size) -> FrameSource:
     smaller = size[0] <= frames.size[0] and size[1] <= frames.size[1]
     how = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
 
-    def read(begin: float) -> Iterator[Frame]:
-        for time, image in frames.read(begin):
+    def read(wanted: Wanted) -> Iterator[Frame]:
+        for time, image in frames.read(wanted):
             yield Frame(time, np.asarray(cv2.resize(image, size, interpolation=how), np.uint8))
 
     return replace(frames, size=size, read=read)

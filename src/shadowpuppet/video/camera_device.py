@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetWarning, VideoError
-from shadowpuppet.video.frames import Frame, FrameSource, Image, check_size, size_of
+from shadowpuppet.video.frames import Frame, FrameSource, Image, Wanted, check_size, size_of
 
 if TYPE_CHECKING:
     from cv2 import VideoCapture
@@ -35,8 +35,9 @@ def open_camera(number: int, grey: bool, rate: float | None) -> FrameSource:
     stated_rate = capture.get(cv2.CAP_PROP_FPS)
     ready, size = [capture], size_of(first)  # opening takes a second: the first reader continues with this capture
 
-    def read(_: float) -> Iterator[Frame]:
-        return _frames(ready.pop() if ready else open_device(number, rate)[0], number, grey, size)
+    def read(wanted: Wanted) -> Iterator[Frame]:
+        frames = _frames(ready.pop() if ready else open_device(number, rate)[0], number, grey, size)
+        return (frame for frame in frames if wanted(frame.time))
 
     return FrameSource(f"camera:{number}", size, stated_rate if stated_rate > 0 else math.nan, None, math.nan, read)
 

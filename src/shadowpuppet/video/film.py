@@ -14,7 +14,7 @@ import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetWarning, VideoError, check_regular, reason
 from shadowpuppet.threads import thread_limit
-from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, size_of
+from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, Wanted, check_size, size_of
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -54,8 +54,8 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
 
     step = 1 / (mean_rate if math.isfinite(mean_rate) else rate or ASSUMED_RATE)
 
-    def read(begin: float) -> Iterator[Frame]:
-        return _frames(path, film, step, grey, rate, begin)
+    def read(wanted: Wanted) -> Iterator[Frame]:
+        return _frames(path, film, step, grey, rate, wanted)
 
     film = FrameSource(str(path), size, rate or mean_rate, count, duration, read)
     return film
@@ -69,7 +69,7 @@ def tells_times(path: Path) -> bool:
     return True  # damaged; reported elsewhere
 
 
-def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float | None, begin: float) -> Iterator[Frame]:
+def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float | None, wanted: Wanted) -> Iterator[Frame]:
     clock, convert, n, longest, broken = _Clock(path, step, quiet=rate is not None), converter(grey), 0, 0.0, ""
     with opened(path) as (container, stream):
         try:
@@ -78,7 +78,7 @@ def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float 
                 shown = n / rate if rate else time
                 if n > 10 and longest < 1.1 * step + 0.001 and time - before > 1.5 * step:  # steady so far, to the millisecond
                     _say(f"{path}: between {before:.3f} and {time:.3f} s frames are missing")
-                if shown >= begin:
+                if wanted(shown):
                     image = convert(frame)
                     check_size(path, n, shown, image, film.size)
                     yield Frame(shown, image)

@@ -17,6 +17,8 @@ Image = NDArray[np.uint8]
 """A picture, of shape (H, W, 3), blue green red, or (H, W) grey, 0..255."""
 Size = tuple[int, int]
 """Width and height, pixels."""
+Wanted = Callable[[float], bool]
+"""Whether the picture of a frame is wanted, asked once for each frame, in order, with its time (s)."""
 
 ROUNDING = 1e-6
 """Rounding error of a time, seconds."""
@@ -45,18 +47,19 @@ class FrameSource:
     """Number of frames; None if the container does not state it."""
     duration: float
     """Seconds; NaN if the container does not state it."""
-    read: Callable[[float], Iterator[Frame]] = field(repr=False)
-    """The frames from a time on (s); earlier ones are passed over without making their pictures."""
+    read: Callable[[Wanted], Iterator[Frame]] = field(repr=False)
+    """The frames that are wanted; the others are passed over without making their pictures."""
 
     def __iter__(self) -> Iterator[Frame]:
         """Read from the start."""
-        return self.read(0.0)
+        return self.read(lambda _: True)
 
     def between(self, begin: float, end: float) -> FrameSource:
         """The frames from `begin` on and before `end`, seconds, at the same times."""
 
-        def read(first: float) -> Iterator[Frame]:
-            return takewhile(lambda frame: frame.time < end - ROUNDING, self.read(max(first, begin - ROUNDING)))
+        def read(wanted: Wanted) -> Iterator[Frame]:
+            inside = self.read(lambda time: time >= begin - ROUNDING and (time >= end - ROUNDING or wanted(time)))
+            return takewhile(lambda frame: frame.time < end - ROUNDING, inside)
 
         return replace(self, count=None, duration=math.nan, read=read)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.errors import ShadowPuppetWarning, VideoError, check_regular, choices, reason
-from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, check_size, size_of
+from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, Wanted, check_size, size_of
 
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
 
@@ -64,7 +64,12 @@ def check_image(path: Path, image: Image) -> None:
 def open_picture(path: Path, grey: bool) -> FrameSource:
     """A picture as a source of one frame."""
     size = size_of(read_image(path, grey))
-    return FrameSource(str(path), size, math.nan, 1, math.nan, lambda _: iter([Frame(0.0, read_image(path, grey))]))
+
+    def read(wanted: Wanted) -> Iterator[Frame]:
+        if wanted(0.0):
+            yield Frame(0.0, read_image(path, grey))
+
+    return FrameSource(str(path), size, math.nan, 1, math.nan, read)
 
 
 def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:
@@ -73,12 +78,12 @@ def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:
     size, n = size_of(read_image(paths[0], grey)), len(paths)
     mean_rate = float((n - 1) / times[-1]) if n > 1 else math.nan
 
-    def read(begin: float) -> Iterator[Frame]:
+    def read(wanted: Wanted) -> Iterator[Frame]:
         if assumed:
             warnings.warn(f"{folder}: no timestamps.txt in it and no rate given: {ASSUMED_RATE:g} frames/s are assumed",
                           ShadowPuppetWarning, stacklevel=2)
         for i, (time, path) in enumerate(zip(times.tolist(), paths)):
-            if time < begin:
+            if not wanted(time):
                 continue
             image = read_image(path, grey)
             check_size(path, i, time, image, size)

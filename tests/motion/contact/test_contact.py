@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.motion.contact.contact import FootEvent, contacts_of, find_contacts, foot_events
-from shadowpuppet.motion.contact.floor import floor_height
+from shadowpuppet.motion.contact.floor import floor_height, under_feet
 from shadowpuppet.motion.contact.stance import agreement, depth, slide
 from shadowpuppet.motion.motion import JointTable
 
@@ -111,3 +111,13 @@ def test_agreement_of_known_contacts():
     found, truth = np.array([[1, 1, 0, 0]], bool), np.array([[1, 0, 0, 1]], bool)
     assert agreement(found, truth) == {"precision": 0.5, "recall": 0.5}
     assert np.isnan(agreement(~found & found, truth)["precision"])
+
+
+def test_the_floor_is_under_the_lowest_foot():
+    names = ("pelvis", "left_ankle", "left_heel")
+    positions = np.full((100, 3, 3), np.nan)
+    positions[:, :, 2] = [-0.3, -1.1, -1.2]
+    positions[:50, 2, 2], positions[7, 2, 2] = -1.0, -5.0
+    assert under_feet(names, positions, 0.8) == pytest.approx(-1.2)
+    assert under_feet(names[:1], positions[:, :1], 0.8) == pytest.approx(-1.1)
+    assert np.isnan(under_feet(names, np.full_like(positions, np.nan), 0.8))

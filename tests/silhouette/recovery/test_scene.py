@@ -9,23 +9,24 @@ from silhouette_scenes import SIZE, empty_shots, grey, overlap, scene, shot
 
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette import learn_background, recover_scene
+from shadowpuppet.silhouette.recovery.head import missing_head
 
 TRUNK, LEGS, SKIN, POSTER = (120, 45, 40), (30, 32, 30), (90, 120, 190), (40, 200, 90)
 
 
-def standing(wall: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+def standing(wall: np.ndarray, n: int, head_still: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """A person (picture, mask) who stands, sways and breathes by a pixel, and swings both arms. The picture cuts the legs."""
     sway, lift, reach = round(1.5 * np.sin(1.7 * n)), round(np.sin(2.3 * n)), round(30 * np.sin(0.9 * n))
     picture, mask = wall.copy(), np.zeros(SIZE, np.uint8)
 
-    def draw(x, y, width, height, colour):
+    def draw(x, y, width, height, colour, lift=lift):
         for image, value in ((picture, colour), (mask, 1)):
             cv2.rectangle(image, (x, y + lift), (x + width, y + height + lift), value, -1)
 
     draw(60 + sway, 45, 36, 40, TRUNK)
     draw(62 + sway, 86, 14, 45, LEGS)
     draw(82 + sway, 86, 14, 45, LEGS)
-    draw(70 + sway, 20, 16, 24, SKIN)
+    draw(70 + sway * (not head_still), 20, 16, 24, SKIN, lift * (not head_still))
     for side, x in ((-1, 60), (1, 96)):
         for image, colour, end in ((picture, TRUNK, 0.6), (mask, 1, 0.6), (picture, SKIN, 1), (mask, 1, 1)):
             start = (x + sway, 50) if end == 0.6 else (x + sway + int(side * 18), 50 + int(0.6 * reach))
@@ -33,8 +34,8 @@ def standing(wall: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     return picture, mask > 0
 
 
-def film(rng: np.random.Generator, wall: np.ndarray, count=40) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    shown = [standing(wall, n) for n in range(count)]
+def film(rng: np.random.Generator, wall: np.ndarray, count=40, head_still=False) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    shown = [standing(wall, n, head_still) for n in range(count)]
     return [shot(rng, picture) for picture, _ in shown], [mask for _, mask in shown]
 
 
@@ -60,6 +61,36 @@ def test_who_stands_through_the_whole_film_is_found(rng, furnished):
     overlaps = [overlap(segmenter(frame), mask) for frame, mask in zip(frames, masks)]
     assert np.median(overlaps) > 0.93
     assert min(overlaps) > 0.88
+
+
+def test_a_head_that_never_moves_is_the_person_s(rng):
+    frames, masks = film(rng, scene(rng), head_still=True)
+    found = recover_scene(frames)
+    assert found.head_still
+    head = np.all(masks, axis=0)
+    head[43:] = False
+    assert (found.covered & head).sum() > 0.8 * head.sum()
+    assert found.covered[:43].sum() < 1.6 * head.sum()
+    assert not recover_scene(film(rng, scene(rng))[0]).head_still
+
+
+def test_only_a_trunk_that_stands_there_throughout_is_given_a_head():
+    covered, passing = np.zeros((100, 120), bool), np.zeros((20, 100, 120), bool)
+    covered[50:90, 45:75] = True
+    passing[:, 55:60, 20:100] = True
+    head = missing_head(covered, passing)
+    assert head is not None
+    rows, columns = np.nonzero(head)
+    assert 30 <= rows.min() < 38
+    assert 46 < rows.max() <= 52
+    assert abs(columns.mean() - 59.5) < 1
+    seen = passing.copy()
+    seen[:, 34:50, 54:66] = True  # the head, which moves
+    assert missing_head(covered, seen) is None
+    for n, frame in enumerate(passing):  # who walks, so that only a little is covered always
+        frame[5:95, 5 * n : 5 * n + 40] = True
+    assert missing_head(covered & (np.arange(100)[:, None] > 75), passing) is None
+    assert missing_head(np.roll(covered, -45, axis=0), np.roll(seen, -45, axis=0) & False) is None  # above the picture
 
 
 def test_the_gap_between_the_legs_is_scene(rng):

@@ -60,7 +60,7 @@ def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes]) 
 def later_sets(rig: Rig, silhouettes: Sequence[Silhouettes], after: float) -> list[tuple[Mask | None, ...]]:
     """Masks (H, W) by camera at `SETS` moments at most, spread over the rest of the films `after` a time (s): of people who come later.
     Found by seeking; none of ready silhouettes, and of films that do not state their length."""
-    ends = [footage.count / footage.film().rate for footage in rig.footage if footage.count and np.isfinite(footage.film().rate)]
+    ends = [footage.count / footage.film.rate for footage in rig.footage if footage.count and np.isfinite(footage.film.rate)]
     begin = rig.recording.begin
     if len(ends) < len(rig.footage) or any(each.segmenter is None for each in silhouettes) or begin + min(ends) < after + LATER:
         return []

@@ -15,6 +15,7 @@ from shadowpuppet.pipeline.footage import FIRST, CameraFrame, Footage, Sample
 from shadowpuppet.pipeline.look import FirstSeconds, Look, Survey
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.census import count_in_picture
+from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes
 from shadowpuppet.pipeline.survey.cautions import (
@@ -34,10 +35,11 @@ UNEVEN = 0.1
 """Jitter over the frame interval above which the film's rate counts as variable."""
 
 
-def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (SceneHint(),)) -> Survey:
+def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (SceneHint(),), listener: Listener | None = None) -> Survey:
     """Examine a recording of one camera; `hints` as in `survey_film`. Raises a `ShadowPuppetError` if something cannot be used."""
-    footage = rig.footage[0]
-    film = survey_film(footage, options, hint=hints[0])
+    footage, steps = rig.footage[0], Steps(listener, rig.names)
+    film = survey_film(footage, options, hint=hints[0], steps=steps)
+    steps("silhouettes of the first seconds")
     look = _look(footage, film)
     if look.refusal and not options.anyway:
         return Survey(rig, (film.silhouettes,), (film.silhouettes,), FirstSeconds([], []), look)

@@ -30,6 +30,9 @@ def recovery_cautions(names: Sequence[str], silhouettes: Sequence[Silhouettes]) 
     found = {name: each.recovered for name, each in zip(names, silhouettes) if each.recovered is not None}
     said = [Caution(f"camera {name!r}: {scene.doubt}", f"camera {name!r}: empty scene not recovered; film it", RUINOUS)
             for name, scene in found.items() if scene.doubt]
+    said += [Caution(f"camera {name!r}: the head never moves in the film, so it cannot be told from the scene: the place above the "
+                     "shoulders where it must be is taken for it; film the empty scene", "head never moves: film the empty scene", HARMFUL)
+             for name, scene in found.items() if scene.head_still]
     hidden = {name: float(scene.covered.mean()) for name, scene in found.items() if not scene.doubt}
     if not hidden:
         return said

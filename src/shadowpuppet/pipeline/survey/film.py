@@ -11,6 +11,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.motion.metrics import overlap
 from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Sample, take_sample
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.progress import Steps
 from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.silhouette.added import AddedParts, SceneHint, always_alike, find_added, find_nobody
@@ -36,11 +37,17 @@ class FilmSurvey(NamedTuple):
     """The fields that `Look` and `CameraLook` have in common."""
 
 
-def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT, hint: SceneHint | None = None) -> FilmSurvey:
+def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT, hint: SceneHint | None = None,
+                steps: Steps | None = None) -> FilmSurvey:
     """Examine one camera's first `longest` frames. `hint`: what is known of its scene from a first look and fit. Raises a
     `ShadowPuppetError` if something cannot be used."""
+    steps = steps or Steps(None, [footage.camera.name])
+    steps("reading the film", footage.camera.name)
     sample = take_sample(footage, options.masks, longest)
+    empty = "learning" if footage.view.background is not None else "recovering"
+    steps(f"{empty} the empty scene, making silhouettes" if not options.masks else "reading silhouettes", footage.camera.name)
     silhouettes, runs = _made(footage, sample, options, None if hint is None else hint.added)
+    steps("judging the silhouettes", footage.camera.name)
     silhouettes, runs = _with_added(footage, sample, silhouettes, runs, options, hint)
     silhouettes = silhouettes.without_clutter([mask for run in runs for mask in run])
     if silhouettes.clutter is not None:
@@ -48,7 +55,7 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT, hi
     masks = [mask for run in runs for mask in run]
     exact = [ready_mask(frame.ready) for frame in sample.frames if frame.ready is not None and silhouettes.segmenter is not None]
     camera = footage.camera
-    return FilmSurvey(sample, silhouettes, masks, exact, {
+    found = FilmSurvey(sample, silhouettes, masks, exact, {
         "size": footage.view.camera.size, "worked_size": camera.size, "background": silhouettes.source,
         "fov": float(np.degrees(2 * np.arctan(camera.size[0] / 2 / camera.matrix[0, 0]))),
         "key": "none" if silhouettes.segmenter is None else silhouettes.segmenter.reason,
@@ -56,6 +63,8 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT, hi
         "left_out": _left_out(silhouettes, footage),
         "condition": condition_of(silhouettes, sample, runs),
     })  # fmt: skip
+    steps("", footage.camera.name)
+    return found
 
 
 def _made(footage: Footage, sample: Sample, options: Options, added: AddedParts | None) -> tuple[Silhouettes, list[list[Mask]]]:

@@ -17,6 +17,7 @@ from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, RigLook, Survey
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.census import later_sets, sampled_sets, take_census
+from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.survey.cautions import GOOD, clutter_cautions, condition_cautions, recovery_cautions, unlike_ready
@@ -30,22 +31,27 @@ RATES, LENGTHS = 0.02, 0.1
 """Relative difference of rates, and difference of lengths (s), above which films are reported to differ."""
 
 
-def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = ()) -> Survey:
+def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), listener: Listener | None = None) -> Survey:
     """Examine each camera's film, and the first seconds of all together; `hints` as in `survey_film`, by camera. Raises a
     `ShadowPuppetError` if something cannot be used."""
+    steps = Steps(listener, rig.names)
+
     def surveyed(footage: Footage, hint: SceneHint) -> FilmSurvey:
-        return survey_film(footage, options, brief_length(footage, options), hint)
+        return survey_film(footage, options, brief_length(footage, options), hint, steps)
 
     with ThreadPoolExecutor(usable_cores(), "look") as pool:
         films = list(pool.map(surveyed, rig.footage, hints or [SceneHint()] * len(rig.footage)))
     silhouettes = tuple(film.silhouettes for film in films)
     census, wide = None, tuple(each.of_several() for each in silhouettes)
     if any(_shows_person(film) for film in films):
+        steps("counting people in all films")
         seen = max((film.sample.times[-1] for film in films if len(film.sample.times)), default=0.0)
         census = take_census(rig.cameras, sampled_sets([film.sample for film in films], wide), later_sets(rig, wide, float(seen)))
     several = census.number if census is not None and census.number > 1 else 0
     silhouettes = wide if several else silhouettes
+    steps("silhouettes of the first seconds in all films")
     first = _first_sets(rig, silhouettes, options.masks)
+    steps("do the cameras agree")
     step = float(np.median(np.diff(first.times))) if len(first.times) > 1 else np.nan
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agreement(rig.cameras, first.masks, step))
@@ -74,7 +80,7 @@ def _first_sets(rig: Rig, silhouettes: Sequence[Silhouettes], ready: bool) -> Fi
 
 def _camera_look(footage: Footage, film: FilmSurvey) -> CameraLook:
     x, y, z = footage.view.camera.centre.tolist()
-    rate = 1 / film.sample.pace if len(film.sample.times) > 1 else footage.film().rate
+    rate = 1 / film.sample.pace if len(film.sample.times) > 1 else footage.film.rate
     return CameraLook(name=footage.camera.name, place=(x, y, z), frames=footage.count, rate=rate, start=footage.view.start, **film.values)
 
 

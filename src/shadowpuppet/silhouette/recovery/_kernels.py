@@ -66,11 +66,27 @@ def _take(own, counts, best, a, b, c):
 
 
 @compiled(nogil=True)
-def send(direction, costs, colour, share, cost, undecided, messages, work):
-    """Send messages from pixel to pixel in one direction: 0 right, 1 left, 2 down, 3 up. messages (4, H, W, L): by direction.
+def pair_costs(costs, colour, share, undecided, between):
+    """Costs of the labels of neighbours, between (2, H, W, L, L): of each pixel and the one to its right, and the one below it.
 
     costs (4,): of a step in the scene, of an outline at an edge, and between like colours; 0.5 over the squared tolerance of colours.
     """
+    height, width = undecided.shape
+    labels = between.shape[3]
+    for way in range(2):
+        for y in range(height - way):
+            for x in range(width - 1 + way):
+                v, u = y + way, x + 1 - way
+                if undecided[y, x] or undecided[v, u]:
+                    for j in range(labels):
+                        for k in range(labels):
+                            between[way, y, x, j, k] = _between(costs, colour[y, x], share[y, x], j, colour[v, u], share[v, u], k)
+
+
+@compiled(nogil=True)
+def send(direction, between, cost, undecided, messages, work):
+    """Send messages from pixel to pixel in one direction: 0 right, 1 left, 2 down, 3 up. messages (4, H, W, L): by direction; `between` as
+    `pair_costs` finds it."""
     height, width = undecided.shape
     across, along = (height, width) if direction < 2 else (width, height)
     against, forward = direction ^ 1, 1 - 2 * (direction % 2)
@@ -82,6 +98,7 @@ def send(direction, costs, colour, share, cost, undecided, messages, work):
             y, x, v, u = (a, at, a, at + forward) if direction < 2 else (at, a, at + forward, a)
             if not (undecided[y, x] or undecided[v, u]):
                 continue
+            pair = between[direction // 2, min(y, v), min(x, u)]
             for k in range(labels):
                 total[k] = cost[y, x, k]
                 for m in range(4):
@@ -92,8 +109,8 @@ def send(direction, costs, colour, share, cost, undecided, messages, work):
                 sent[k] = never
                 if cost[v, u, k] < never:
                     for j in range(labels):
-                        if cost[y, x, j] < never and total[j] < sent[k]:
-                            sent[k] = min(sent[k], total[j] + _between(costs, colour[y, x], share[y, x], j, colour[v, u], share[v, u], k))
+                        if cost[y, x, j] < never:
+                            sent[k] = min(sent[k], total[j] + (pair[j, k] if forward == 1 else pair[k, j]))
                     least = min(least, sent[k])
             for k in range(labels):
                 messages[direction, v, u, k] = sent[k] - least if cost[v, u, k] < never else np.float32(0)

@@ -24,10 +24,22 @@ NEVER = 1e9
 """Cost of a label that a pixel cannot have."""
 
 
-def label_pixels(colour: Floats, share: Floats, cost: Floats, undecided: NDArray[np.bool_]) -> NDArray[np.intp]:
+def pair_costs(colour: Floats, share: Floats, undecided: NDArray[np.bool_]) -> Floats:
+    """The cost of the labels of a pixel and its neighbour, (2, H, W, K + 1, K + 1): the one to the right, and the one below.
+
+    colour, share: modes (H, W, K, 3) and their shares (H, W, K). undecided: pixels (H, W) with more than one possible label.
+    """
+    from shadowpuppet.silhouette.recovery import _kernels
+
+    between = np.zeros((2, *undecided.shape, share.shape[2] + 1, share.shape[2] + 1), np.float32)
+    _kernels.pair_costs(COSTS, colour, share, undecided, between)
+    return between
+
+
+def label_pixels(between: Floats, cost: Floats, undecided: NDArray[np.bool_]) -> NDArray[np.intp]:
     """The labels (H, W) of least cost: the number of the mode that is the scene, or K for pixels that are always covered.
 
-    colour, share: modes (H, W, K, 3) and their shares (H, W, K). cost: that of each label (H, W, K + 1); `NEVER` where it is impossible.
+    between: the costs of neighbours, of `pair_costs`. cost: that of each label (H, W, K + 1); `NEVER` where it is impossible.
     undecided: pixels (H, W) with more than one possible label.
     """
     from shadowpuppet.silhouette.recovery._kernels import send
@@ -36,5 +48,5 @@ def label_pixels(colour: Floats, share: Floats, cost: Floats, undecided: NDArray
     work = np.empty((2, cost.shape[2]), np.float32)
     for _ in range(SWEEPS):
         for direction in range(4):
-            send(direction, COSTS, colour, share, cost, undecided, messages, work)
+            send(direction, between, cost, undecided, messages, work)
     return (cost + messages.sum(axis=0)).argmin(axis=2)

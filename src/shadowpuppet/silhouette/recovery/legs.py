@@ -30,7 +30,7 @@ def still_legs(still: Floats, movement: Movement, covered: Mask) -> Mask | None:
     """
     import cv2
 
-    trunk = _largest(covered)
+    trunk = largest_part(covered)
     if trunk is None:
         return None
     zone = _zone(trunk) & ~movement.region
@@ -49,7 +49,8 @@ def still_legs(still: Floats, movement: Movement, covered: Mask) -> Mask | None:
     return np.asarray(cv2.dilate(legs.astype(np.uint8), np.ones((3, 3), np.uint8)), np.uint8) > 0
 
 
-def _largest(covered: Mask) -> Mask | None:
+def largest_part(covered: Mask) -> Mask | None:
+    """The largest part of covered pixels (H, W); None if it is smaller than a trunk."""
     import cv2
 
     _, parts, stats, _ = cv2.connectedComponentsWithStats(covered.astype(np.uint8), connectivity=4)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,13 +14,14 @@ from shadowpuppet.silhouette.background import Floats, Image, check_alike, check
 from shadowpuppet.silhouette.correction.light import Light
 from shadowpuppet.silhouette.recovery.colours import UNKNOWN, colour_model, known, log_ratio
 from shadowpuppet.silhouette.recovery.filling import filled
-from shadowpuppet.silhouette.recovery.labelling import NEVER, label_pixels
+from shadowpuppet.silhouette.recovery.head import missing_head
+from shadowpuppet.silhouette.recovery.labelling import NEVER, label_pixels, pair_costs
 from shadowpuppet.silhouette.recovery.legs import still_legs
-from shadowpuppet.silhouette.recovery.modes import COUNT, Modes, radius_of, temporal_modes
+from shadowpuppet.silhouette.recovery.modes import COUNT, Modes, radius_of, ranked, temporal_modes
 from shadowpuppet.silhouette.recovery.movement import Mask, Movement, find_movement, unsteady
 
-WORKED_WIDTH = 320
-"""Greatest width, pixels, of the pictures in which scene and person are separated; the scene's own picture has the frames' size."""
+WORKED_WIDTH, WORKED_AREA = 320, 320 * 240
+"""Greatest width and area, pixels, of the pictures in which scene and person are separated; the scene's own has the frames' size."""
 LEAST_FRAMES = 3
 """Least number of frames: with fewer, moving and still pixels cannot be distinguished."""
 LEAST_SEEN = 2
@@ -61,6 +62,8 @@ class RecoveredScene:
     """Number of frames that it was recovered from."""
     doubt: str | None = None
     """Why it is no empty scene, and the remedy; None if nothing speaks against it."""
+    head_still: bool = False
+    """Whether the head never moves, so that the pixels where it must be count as covered."""
 
 
 def recover_scene(frames: Sequence[Image]) -> RecoveredScene:
@@ -71,7 +74,8 @@ def recover_scene(frames: Sequence[Image]) -> RecoveredScene:
     3. `modes.temporal_modes`: the colours that each of these pixels shows, with their shares.
     4. `labelling.label_pixels`: which mode is the scene's, or whether the person covers the pixel always. The first time the colours of
        the person are unknown; then `colours.log_ratio` compares what passed over the scene with the scene. If `legs.still_legs` finds
-       legs that kept still below a trunk, they are added to the pixels of step 2, and all are labelled again.
+       legs that kept still below a trunk, they are added to the pixels of step 2, and all are labelled again. Where
+       `head.missing_head` finds that a trunk has no head, the person covers the place of one.
     5. The scene's picture at full size: the mean of the frames that show the mode. Covered pixels are filled from around.
 
     Raises `SilhouetteError` for fewer than 3 frames, and frames that do not fit together.
@@ -82,8 +86,8 @@ def recover_scene(frames: Sequence[Image]) -> RecoveredScene:
     movement = find_movement(planes)
     if doubt := _doubt(movement):
         return RecoveredScene(_median(frames), np.zeros(frames[0].shape[:2], bool), len(frames), doubt)
-    scene, covered = _labelled(planes, movement)
-    return _at_full_size(frames, scene, covered, movement)
+    scene, covered, head_still = _labelled(planes, movement)
+    return replace(_at_full_size(frames, scene, covered, movement), head_still=head_still)
 
 
 def check_frames(frames: Sequence[Image]) -> None:
@@ -110,18 +114,17 @@ def _in_one_light(frames: Sequence[Image]) -> list[Image]:
 
 
 def _median(frames: Sequence[Image]) -> Image:
-    middle, rows = len(frames) // 2, 32
-    strips = (np.stack([f[y : y + rows] for f in frames]) for y in range(0, len(frames[0]), rows))
-    return np.concatenate([np.partition(strip, middle, axis=0)[middle] for strip in strips])
+    return ranked(frames, len(frames) // 2)
 
 
 def _reduced(image: Image) -> Image:
     import cv2
 
     height, width = image.shape[:2]
-    if width <= WORKED_WIDTH:
+    scale = min(WORKED_WIDTH / width, (WORKED_AREA / (width * height)) ** 0.5)
+    if scale >= 1:
         return image
-    size = WORKED_WIDTH, max(1, round(height * WORKED_WIDTH / width))
+    size = max(1, round(width * scale)), max(1, round(height * scale))
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
@@ -139,8 +142,8 @@ class _Field(NamedTuple):
     frames: int
 
 
-def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask]:
-    """The scene's Y, Cr, Cb (h, w, 3), and the pixels (h, w) that are always covered, at the reduced size."""
+def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask, bool]:
+    """The scene's Y, Cr, Cb (h, w, 3), the pixels (h, w) that are always covered, at the reduced size, and whether a head never moves."""
     radius = radius_of(movement.noise)
     found = _rounds(planes, movement)
     legs = still_legs(found.field.still, movement, found.covered)
@@ -150,10 +153,12 @@ def _labelled(planes: Floats, movement: Movement) -> tuple[Floats, Mask]:
     field, region = found.field, movement.region
     passing = (np.abs(planes - _scene(field, found.labels)) > radius).any(axis=3) & region
     covered = _persons_parts(found.covered, passing, region, found.ratio[:, 0])
+    head = missing_head(covered, passing)
+    covered = covered if head is None else covered | head
     cost = _costs(field, found.ratio, found.below)
     cost[..., COUNT] = np.where(covered, 0, NEVER)
     cost[covered, :COUNT] = NEVER
-    return _scene(field, label_pixels(*_on_picture(field), cost, region)[region]), covered
+    return _scene(field, label_pixels(found.between, cost, region)[region]), covered, head is not None
 
 
 class _Found(NamedTuple):
@@ -168,22 +173,31 @@ class _Found(NamedTuple):
     """As `_below` finds it (M,)."""
     covered: Mask
     """Pixels (H, W) that are labelled as always covered."""
+    between: Floats
+    """Costs of neighbours' labels, of `pair_costs`."""
 
 
 def _rounds(planes: Floats, movement: Movement) -> _Found:
     """The labels after `ROUNDS` rounds on frames' planes (N, H, W, 3)."""
     modes = temporal_modes(planes[:, movement.region], radius_of(movement.noise))
-    field = _Field(modes, movement, np.median(planes, axis=0).astype(np.float32), len(planes))
-    colour, share = _on_picture(field)
+    field = _Field(modes, movement, _middle(planes), len(planes))
+    between = pair_costs(*_on_picture(field), movement.region)
     labels, ratio, below = None, np.zeros(0), np.zeros(0, bool)
     for _ in range(ROUNDS):
         below = _below(field, labels)
         ratio = _colour_ratio(field, labels, below)
-        labels = label_pixels(colour, share, _costs(field, ratio, below), movement.region)[movement.region]
+        labels = label_pixels(between, _costs(field, ratio, below), movement.region)[movement.region]
     assert labels is not None
     covered = np.zeros(movement.region.shape, bool)
     covered[movement.region] = labels == COUNT
-    return _Found(field, labels, ratio, below, covered)
+    return _Found(field, labels, ratio, below, covered, between)
+
+
+def _middle(planes: Floats) -> Floats:
+    """The median (H, W, 3) of frames' planes (N, H, W, 3), which are whole numbers."""
+    whole = planes.astype(np.uint8)
+    lower, upper = (ranked(whole, rank).astype(np.float32) for rank in ((len(planes) - 1) // 2, len(planes) // 2))
+    return np.float32(0.5) * (lower + upper)
 
 
 def _scene(field: _Field, labels: NDArray[np.intp]) -> Floats:

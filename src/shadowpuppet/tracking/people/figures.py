@@ -35,8 +35,8 @@ NONE, NEW, KNOWN = 0, 1, 2
 """What a pixel is: no silhouette, silhouette that nobody explains, silhouette that may be another's."""
 
 
-TRIED_REACH = 0.3
-"""Distance (m) beyond the surface points to which floors reach that are only tried."""
+TRIED_REACH, TRIED_NEAR = 0.3, 0.5
+"""Distance (m) beyond the surface points to which floors reach that are only tried, and greatest distance of their places from a point."""
 
 
 class Figure(NamedTuple):
@@ -99,7 +99,7 @@ def find_floor(cameras: Sequence[Camera], points: Array, sets: Sequence[Sequence
     def best(levels: Sequence[float]) -> float:
         for level in levels:
             if all(abs(level - other) > 0.02 for other in tried):
-                floor = floor_under(cameras, points, level, TRIED_REACH)
+                floor = floor_under(cameras, points, level, TRIED_REACH, TRIED_NEAR)
                 tried[level] = sum(figure.evidence for masks in sets for figure in find_people(floor, masks))
         return max(tried, key=lambda level: tried[level])
 

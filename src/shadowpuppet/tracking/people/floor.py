@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
+from shadowpuppet.jit import kernel
 
 PITCHES, MOST_PLACES = (0.1, 0.125, 0.15, 0.2), 5000
 """Distances of neighbouring places that are tried, metres: the first that gives no more than `MOST_PLACES`."""
@@ -48,14 +49,19 @@ class Floor(NamedTuple):
     `TRUNK`, `LEGS`, the guard above and the guard below; -1 outside of the picture."""
 
 
-def floor_under(cameras: Sequence[Camera], points: Array, level: float, reach: float = REACH) -> Floor:
-    """The floor at a `level`, metres, below surface points (P, 3), world, metres, of all people, and `reach` beyond them."""
+def floor_under(cameras: Sequence[Camera], points: Array, level: float, reach: float = REACH, near: float = np.inf) -> Floor:
+    """The floor at a `level`, metres, below surface points (P, 3), world, metres, of all people, and `reach` beyond them; only places that
+    have a point at most `near` from them."""
+    from scipy.spatial import KDTree
+
     middle = np.median(points[:, :2], axis=0)
     low = np.maximum(np.percentile(points[:, :2], 1, axis=0) - reach, middle - HALF_WIDTH)
     high = np.minimum(np.percentile(points[:, :2], 99, axis=0) + reach, middle + HALF_WIDTH)
     pitch = next((each for each in PITCHES if np.prod(np.ceil((high - low) / each)) <= MOST_PLACES), PITCHES[-1])
     x, y = (np.arange(start, end, pitch) for start, end in zip(low, high))
     places = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
+    if np.isfinite(near):
+        places = places[KDTree(points[:, :2]).query(places, distance_upper_bound=near)[0] <= near]
     pixels = np.stack([_pixels(camera, places, level) for camera in cameras], 2)
     return Floor(tuple(cameras), level, places, pitch, pixels)
 
@@ -72,10 +78,27 @@ def _pixels(camera: Camera, places: Array, level: float) -> NDArray[np.int32]:
         up = (np.array([z for z, aside in rows for _ in aside]) - UNDER) / (nodes[1] - nodes[0])
         across = np.array([each for _, aside in rows for each in aside]) / ASIDE[-1] + 1
         k, m = np.clip(up.astype(int), 0, NODES - 2), np.clip(across.astype(int), 0, 1)
-        u, v = (up - k).astype(np.float32)[:, None], (across - m).astype(np.float32)[:, None]
-        found[:, n] = _index(camera, (1 - u) * ((1 - v) * exact[:, k, m] + v * exact[:, k, m + 1])
-                             + u * ((1 - v) * exact[:, k + 1, m] + v * exact[:, k + 1, m + 1]))  # fmt: skip
+        _between(exact, k, m, (up - k).astype(np.float32), (across - m).astype(np.float32), _halved(camera), found[:, n])
     return found
+
+
+@kernel
+def _between(exact, k, m, u, v, size, found):  # pragma: no cover
+    """Index (N, P) of the pixels of points between projected ones (N, nodes, 3, 2): shares u and v (P,) of the way from node k, m (P,)."""
+    width, height = size
+    one, half, beyond = np.float32(1), np.float32(0.5), np.float32(-9)
+    for n in range(found.shape[0]):
+        for p in range(found.shape[1]):
+            a, b = one - u[p], one - v[p]
+            near, far = exact[n, k[p], m[p]], exact[n, k[p], m[p] + 1]
+            above, beside = exact[n, k[p] + 1, m[p]], exact[n, k[p] + 1, m[p] + 1]
+            x = half * (a * (b * near[0] + v[p] * far[0]) + u[p] * (b * above[0] + v[p] * beside[0]))
+            y = half * (a * (b * near[1] + v[p] * far[1]) + u[p] * (b * above[1] + v[p] * beside[1]))
+            found[n, p] = -1
+            if x > beyond and y > beyond and x < width and y < height:  # not of points behind the camera, which are not a number
+                i, j = int(np.rint(x)), int(np.rint(y))
+                if 0 <= i < width and 0 <= j < height:
+                    found[n, p] = j * width + i
 
 
 def figure_points(camera: Camera, places: Array, z: Array, across: Array) -> Array:
@@ -94,10 +117,15 @@ def pixel_index(camera: Camera, points: Array) -> NDArray[np.int32]:
 
 def _index(camera: Camera, pixels: Array) -> NDArray[np.int32]:
     """The same of pixels (..., 2) of the whole picture."""
-    width, height = (camera.size[0] + 1) // 2, (camera.size[1] + 1) // 2
+    width, height = _halved(camera)
     at = np.rint(np.nan_to_num(0.5 * pixels, nan=-9.0, posinf=-9.0, neginf=-9.0).clip(-9, 1e6)).astype(np.int32)
     x, y = at[..., 0], at[..., 1]
     return np.where((x >= 0) & (x < width) & (y >= 0) & (y < height), y * width + x, -1).astype(np.int32)
+
+
+def _halved(camera: Camera) -> tuple[int, int]:
+    """Width and height of a camera's masks of half the size."""
+    return (camera.size[0] + 1) // 2, (camera.size[1] + 1) // 2
 
 
 POINTS = sum(len(aside) for _, aside in TRUNK) + len(LEGS) * len(ASIDE) + 3 + len(ASIDE)

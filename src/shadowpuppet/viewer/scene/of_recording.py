@@ -42,7 +42,7 @@ def cameras_of(recording: Recording, options: Options, ready: bool | None = None
 
 def frame_times(footage: Sequence[Footage]) -> Array:
     """Times of the frames of the film with the median rate, seconds."""
-    rates = [film.rate if np.isfinite(film.rate) else ASSUMED_RATE for film in (each.film() for each in footage)]
+    rates = [film.rate if np.isfinite(film.rate) else ASSUMED_RATE for film in (each.film for each in footage)]
     n = int(np.argsort(rates)[(len(rates) - 1) // 2])
     count = footage[n].count
     if count is None:  # unknown length: read the whole film once

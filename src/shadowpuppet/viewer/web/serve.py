@@ -51,10 +51,10 @@ def serving(scene: Scene, options: ViewOptions, **more: int) -> Iterator[tuple[s
 
 
 def default_view(scene: Scene, pictures: bool = True) -> ViewOptions:
-    """The first view of a scene: bodies transparent if a truth or an uncertainty is inside them, hull points if there is no puppet, the
-    pictures of films (or their silhouettes alone)."""
+    """The first view of a scene: bodies transparent if a truth is inside them, hull points if there is no puppet, the pictures of films
+    (or their silhouettes alone)."""
     kinds = {figure.kind for figure in scene.figures}
     mode = PictureMode.PICTURE if pictures else PictureMode.SILHOUETTE
-    transparent = "estimate" in kinds and ("truth" in kinds or scene.has_uncertainty)
+    transparent = {"estimate", "truth"} <= kinds
     return ViewOptions(transparent=transparent, hull=scene.hull is not None and "estimate" not in kinds, pictures=mode,
                        uncertainty=scene.has_uncertainty)
