@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.evaluation import Comparison, measure_run
 from shadowpuppet.evaluation.report.charts import by_joint_and_time
 from shadowpuppet.evaluation.report.page import page, write_report
-from shadowpuppet.evaluation.report.pictures import draw_bones, pictures, report_frames
+from shadowpuppet.evaluation.report.pictures import _side_by_side, draw_bones, pictures, report_frames
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.motion.table import write_joints
@@ -270,6 +271,18 @@ def test_of_several_cameras_overlay_the_person_is_cut_out(tmp_path):
         white = np.argwhere(tile[len(tile) // 10 :].min(2) > 200)
         assert len(white) > 50
         assert abs(white[:, 1].mean() / tile.shape[1] - 0.5) < 0.2
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_the_five_cameras_that_see_the_person_largest_are_shown(side):
+    """Of two the picture is smaller, wherever in it the person is."""
+    cameras, far = [], (1, 4)
+    for n in range(7):
+        focal, aside = (70, -side * 50) if n in far else (140, side * 50)
+        cameras.append(replace(camera(f"cam{n}"), matrix=[[focal, 0, 79.5 + aside], [0, focal, 59.5], [0, 0, 1]]))
+    image = _side_by_side([np.full((SIZE[1], SIZE[0], 3), 20 + 30 * n, np.uint8) for n in range(7)], cameras,
+                          [JointTable(TRUTH.times[:1], TRUTH.names, TRUTH.positions[:1])])
+    assert [np.median(tile) for tile in np.array_split(image, 5, axis=1)] == [20 + 30 * n for n in range(7) if n not in far]
 
 
 def test_frames_of_several_cameras_are_drawn_from_the_recording(tmp_path):

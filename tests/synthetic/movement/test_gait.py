@@ -160,6 +160,16 @@ def test_a_walking_person_bends_hip_and_knee_as_published():
     assert by_phase(knee, own, [0.4])[0] < 14
 
 
+@pytest.mark.parametrize(("jogging", "most"), [(False, (0.01, 0.03)), (True, (0.005, 0.02))])
+def test_the_pelvis_sways_over_the_foot_that_stands(jogging, most):
+    walk, found, phase = steady(jogging)
+    side = at(found, "pelvis")[:, 0]
+    stands = walk.cycle.middle + 0.08  # of the left leg, in the middle of its stance; to the left lies +X
+    left, right = by_phase(side, phase, [stands, stands + 0.5]) - side.mean()
+    assert most[0] < left < most[1]
+    assert most[0] < -right < most[1]
+
+
 def test_a_jogging_person_flies_and_a_walking_one_does_not():
     for jogging in (False, True):
         walk, found, phase = steady(jogging)
