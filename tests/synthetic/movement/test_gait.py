@@ -86,6 +86,15 @@ def test_the_motions_on_which_settings_were_chosen_stay_as_they_are(n, frame, jo
     np.testing.assert_allclose(at(found, joint)[frame], wanted, atol=2e-9)
 
 
+@pytest.mark.parametrize(("name", "wanted"), [
+    ("box", -0.471584), ("jog", -0.975847), ("jump", 0.043308), ("kneel", -0.054927), ("lift", -0.057124), ("march", 0.122091),
+    ("random_body", -0.201648), ("sit", -0.049591), ("sit_down", -0.049496), ("squat", -0.067062), ("turn_around", 0.086989),
+    ("walk", 0.343969)])  # fmt: skip
+def test_the_actions_before_which_settings_were_chosen_stay_as_they_are(name, wanted):
+    joints = go(name)[1].joints
+    assert (joints * np.cos(np.arange(joints.size)).reshape(joints.shape)).sum() == pytest.approx(wanted, abs=1e-5)
+
+
 @pytest.mark.parametrize(("seed", "kind", "stature", "girth"), [
     (1, "man", 1.7798453, 1.0264350), (9, "child", 1.2516879, 0.7807431), (13, "woman", 1.7459124, 1.0766451)])  # fmt: skip
 def test_the_people_on_whom_settings_were_chosen_stay_as_they_are(seed, kind, stature, girth):
