@@ -297,6 +297,7 @@ def test_frames_of_several_cameras_are_drawn_from_the_recording(tmp_path):
     of = measure_run(run)
     shots, source = pictures(of, report_frames(of))
     assert (len(shots), source) == (8, "the recording")
+    assert '<div class="shots wide">' in page(of)
     for each in report_frames(of):
         image = cv2.imdecode(np.frombuffer(shots[each.letter], np.uint8), cv2.IMREAD_COLOR)
         assert np.median(image) == pytest.approx(40 + 2 * each.frame, abs=5)

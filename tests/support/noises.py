@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import fftconvolve
 
 SPEED_OF_SOUND = 343.0
 
@@ -33,7 +34,7 @@ def heard(rng: np.random.Generator, sound: np.ndarray, rate: int, late: float, *
         at = rng.uniform(0.003, 0.35)
         echoes[round(at * rate)] += 0.3 * rng.standard_normal() * np.exp(-at / 0.12)
     n = round((late + way / SPEED_OF_SOUND) * rate)
-    room = np.convolve(sound, echoes)[: len(sound)]
+    room = fftconvolve(sound, echoes)[: len(sound)]
     moved = np.concatenate([np.zeros(max(n, 0)), room[max(-n, 0) :]])
     return (loudness * (moved + noise * rng.standard_normal(len(moved)))).clip(-1, 1)
 

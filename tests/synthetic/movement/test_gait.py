@@ -87,12 +87,12 @@ def test_the_motions_on_which_settings_were_chosen_stay_as_they_are(n, frame, jo
 
 
 @pytest.mark.parametrize(("name", "wanted"), [
-    ("box", -0.471584), ("jog", -0.975847), ("jump", 0.043308), ("kneel", -0.054927), ("lift", -0.057124), ("march", 0.122091),
-    ("random_body", -0.201648), ("sit", -0.049591), ("sit_down", -0.049496), ("squat", -0.067062), ("turn_around", 0.086989),
-    ("walk", 0.343969)])  # fmt: skip
+    ("box", -135.122589), ("jog", -92.459863), ("jump", -85.543916), ("kneel", -34.084659), ("lift", -80.496554),
+    ("march", -118.350827), ("random_body", -113.350090), ("sit", -119.987044), ("sit_down", -121.609135),
+    ("squat", -93.096875), ("turn_around", -102.284140), ("walk", -227.746995)])  # fmt: skip
 def test_the_actions_before_which_settings_were_chosen_stay_as_they_are(name, wanted):
     joints = go(name)[1].joints
-    assert (joints * np.cos(np.arange(joints.size)).reshape(joints.shape)).sum() == pytest.approx(wanted, abs=1e-5)
+    assert (joints * np.random.default_rng(1).standard_normal(joints.shape)).sum() == pytest.approx(wanted, abs=1e-5)
 
 
 @pytest.mark.parametrize(("seed", "kind", "stature", "girth"), [
