@@ -10,6 +10,7 @@ from scipy import ndimage
 from shadowpuppet.body.anthropometry import ANATOMICAL_SHARES, BONE_SHARES, CYLINDER_SHARES, SOLE, stature_of
 from shadowpuppet.body.models import MODELS, WHOLE, average_sizes, kind_of, make_body, sizes_kind
 from shadowpuppet.body.shapes import Body, Hulls, Limbs
+from shadowpuppet.body.sizes import HEIGHTS, expected_metres, is_within
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.rasterize import Picture
@@ -252,3 +253,10 @@ def test_the_likeliest_stature_is_between_those_of_the_bones_nearer_to_the_surer
     unlikely = sum(((grid * share - lengths[name]) / deviation) ** 2
                    for name, (share, deviation) in (("thigh_length", thigh), ("ankle_height", ankle)))
     assert stature_of(lengths) == pytest.approx(grid[unlikely.argmin()], abs=1e-4)
+
+
+@pytest.mark.parametrize(("height", "fits", "hint"), [(1.75, True, ""), (0.5, True, ""), (2.5, True, ""), (2.51, False, ""), (0.4, False, ""),
+                                                      (175, False, " (175 cm are 1.75)"), (True, False, ""), ("1.75", False, "")])
+def test_heights_are_metres_and_centimetres_get_a_hint(height, fits, hint):
+    assert is_within(height, HEIGHTS) == fits
+    assert expected_metres(height, HEIGHTS) == f"expected 0.5 to 2.5 metres{hint}"

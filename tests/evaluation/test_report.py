@@ -19,7 +19,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import app as cli
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.evaluation import Comparison, measure_run
-from shadowpuppet.evaluation.report.charts import by_joint_and_time
+from shadowpuppet.evaluation.report.charts import POINTS, _binned, by_joint_and_time
 from shadowpuppet.evaluation.report.page import page, write_report
 from shadowpuppet.evaluation.report.pictures import _side_by_side, draw_bones, pictures, report_frames
 from shadowpuppet.geometry import rigid
@@ -233,6 +233,15 @@ def grey_share(svg: str) -> float:
     assert found is not None
     image = cv2.imdecode(np.frombuffer(base64.b64decode(found[1]), np.uint8), cv2.IMREAD_COLOR)
     return float((np.abs(image.astype(int) - [0x78, 0x70, 0x6B]).max(2) < 6).mean())
+
+
+def test_a_curve_of_many_frames_is_drawn_as_means_of_neighbours():
+    times = np.arange(3.0 * POINTS)
+    gaps = np.where(np.arange(len(times)) % 3 == 1, np.nan, times)
+    gaps[:3] = np.nan
+    middle, known = _binned(times, [gaps])
+    np.testing.assert_allclose(middle, 3 * np.arange(POINTS) + 1)
+    np.testing.assert_allclose(known, [np.nan, *middle[1:]])
 
 
 def test_frames_of_a_camera_s_overlay_are_shown_side_by_side_with_the_truth(tmp_path, quick):
