@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
 
-import shadowpuppet
 from papers.common.experiment import Request
 from papers.common.many import shown_progress
+from papers.common.sources import digest
 from papers.liu2011.material import Case, seen
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
@@ -67,7 +65,8 @@ class Runs:
 def repeat(request: Request, case: Case, settings: MonocularSettings, every: int = 1, runs: int | None = None) -> Runs:
     """A run for each seed, the same whatever the number of workers; those that are there already, made by the same code, are taken."""
     options, seeds = replace(case.options, tracker=settings, every=every), request.seeds[:runs]
-    folder = request.output / "runs" / f"{case.name}-{_code()}"
+    code = digest(__name__)[:8]
+    folder = request.output / "runs" / f"{case.name}-{code}"
     workers = request.workers if request.workers > 1 else 0
     bar = _Bar(f"{len(seeds)} runs, {settings.resampling}")
     batch = run_batch([case.folder], folder, make_grid(plain_options(options)), seeds, workers=workers, listener=bar, track=follow)
@@ -124,14 +123,6 @@ class _Bar(BatchListener):
         self._progress.advance(self._bar, not again)
         if self._progress.finished:
             self._progress.stop()
-
-
-@lru_cache(maxsize=1)
-def _code() -> str:
-    """What tells the runs of changed code from those before."""
-    folders = Path(str(shadowpuppet.__file__)).parent, Path(__file__).parent
-    code = b"".join(path.read_bytes() for folder in folders for path in sorted(folder.rglob("*.py")))
-    return hashlib.sha256(code).hexdigest()[:8]
 
 
 def _read(path: Path) -> dict[str, Array]:

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import shadowpuppet
 from papers.common.experiment import Request
+from papers.common.sources import digest
 from shadowpuppet.body.models import make_body, sizes_kind
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
@@ -49,9 +49,9 @@ class Source(NamedTuple):
     """By how much the pictures of what is drawn are smaller."""
 
     @property
-    def digest(self) -> str:
+    def key(self) -> str:
         """Of all that what is read of it depends on: its files, and the programs that read them."""
-        parts: list[Any] = [self.name, str(self.spec), self.masks, self.factor, _program()]
+        parts: list[Any] = [self.name, str(self.spec), self.masks, self.factor, digest("papers.ni2008.reading")]
         if self.path is not None:
             files = sorted(path for path in self.path.rglob("*") if path.is_file())
             parts += [(str(path), path.stat().st_size, path.stat().st_mtime_ns) for path in files]
@@ -151,7 +151,7 @@ def sources(request: Request) -> list[Source]:
 
 def load(request: Request, source: Source) -> Case:
     """A recording's case, from the folder `seen` of the request's, where it is read already."""
-    folder = request.output / "seen" / f"{source.name}-{source.digest}"
+    folder = request.output / "seen" / f"{source.name}-{source.key}"
     if not (folder / "case.npz").exists():
         request.tell(f"reading {source.path or f'{source.name}: its silhouettes are drawn'}")
         folder.mkdir(parents=True, exist_ok=True)
@@ -195,16 +195,6 @@ def _of_humaneva(request: Request, data: Path, action: str) -> Source:
     return Source(found.recording.name, folder)
 
 
-def _program() -> str:
-    """What the programs are that read recordings and track: a digest of their text."""
-    text = hashlib.sha256()
-    package = Path(shadowpuppet.__file__).parent
-    for path in [*sorted(package.rglob("*.py")), *sorted(Path(__file__).parent.glob("*.py"))]:
-        if path.name in ("inputs.py", "reading.py", "tracks.py") or package in path.parents:
-            text.update(path.read_bytes())
-    return text.hexdigest()
-
-
-def key_of(values: Any) -> str:
-    """A short name of plain values, for a file."""
-    return hashlib.sha256(json.dumps([values, _program()], sort_keys=True).encode()).hexdigest()[:16]
+def key_of(values: Any, *modules: str) -> str:
+    """A short name, for a file, of plain values and of the source files that `modules` depend on."""
+    return hashlib.sha256(json.dumps([values, digest(*modules)], sort_keys=True).encode()).hexdigest()[:16]

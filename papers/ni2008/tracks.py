@@ -27,6 +27,8 @@ from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
+METHODS = ("shadowpuppet.tracking.multiview.tracker", "shadowpuppet.motion.prior.vqpca", "shadowpuppet.motion.prior.training")
+"""What runs depend on beside this file and the case, whose name has a key of its own: a change elsewhere leaves them as they are."""
 REGIONS, DIMENSIONS = 20, 3
 """M and m of Table II's hybrid."""
 ITERATIONS = 160
@@ -170,5 +172,6 @@ def _key(way: Way) -> str:
 
 
 def _job(request: Request, case: Case, way: Way, seed: int) -> Job:
-    file = request.output / "runs" / case.name / f"{key_of([case.path.name, way.plain, seed, BODY])}.npz"
+    key = key_of([case.path.name, way.plain, seed, BODY, Path(__file__).read_text("utf-8")], *METHODS)
+    file = request.output / "runs" / case.name / f"{key}.npz"
     return Job(case.path, case.name, way, seed, file)

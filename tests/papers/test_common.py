@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from papers.common import plotting, reproduction
+from papers.common import plotting, reproduction, sources
 from papers.common.claims import Verdict, all_of, difference
 from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.many import run_all
@@ -272,3 +272,32 @@ def test_a_page_without_a_place_is_reported(tmp_path, docs, capsys):
     (docs / "reproduction.md").write_text("# Page\n")
     assert reproduction.main([str(results(tmp_path / "a", 1)), "--docs", str(docs)]) == 2
     assert "expected a line <!-- tests -->" in capsys.readouterr().err
+
+
+def test_the_digest_of_sources_changes_with_what_is_imported_and_with_nothing_else(tmp_path, monkeypatch):
+    texts = {"track": "from shadowpuppet.cost import weigh\n", "cost": "def weigh():\n    import shadowpuppet.camera.lens\n",
+             "camera/lens": "import numpy\n", "camera/__init__": "", "viewer": "import shadowpuppet.track\n"}  # fmt: skip
+    for name, text in texts.items():
+        (tmp_path / f"{name}.py").parent.mkdir(exist_ok=True)
+        (tmp_path / f"{name}.py").write_text(text, "utf-8")
+    monkeypatch.setitem(sources.PACKAGES, "shadowpuppet", tmp_path)
+
+    def digest() -> str:
+        return sources.digest.__wrapped__("shadowpuppet.track")
+
+    first = digest()
+    for name, counts in (("viewer", False), ("camera/__init__", False), ("camera/lens", True), ("cost", True), ("track", True)):
+        with (tmp_path / f"{name}.py").open("a", encoding="utf-8") as file:
+            file.write("# changed\n")
+        assert (digest() != first) == counts, name
+        first = digest()
+
+
+def test_a_figure_does_not_depend_on_the_viewer():
+    from papers.liu2011 import repeats
+    from papers.ni2008 import tracks
+
+    for modules in ((repeats.__name__,), tracks.METHODS):
+        assert {f"shadowpuppet.{room}" for room in ("viewer", "live", "cli")}.isdisjoint(
+            name.rpartition(".")[0] for name in sources.sources(*modules))
+        assert any("resampling" in name for name in sources.sources(*modules))

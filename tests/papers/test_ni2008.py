@@ -95,10 +95,10 @@ def test_a_run_is_kept_under_all_that_it_depends_on(case, asked, monkeypatch):
             for seed in (0, 1)]
     assert len(set(jobs)) == len(jobs)
     source = inputs.sources(asked)[2]
-    digest = source.digest
-    assert source._replace(masks=True).digest != digest
-    monkeypatch.setattr(inputs, "_program", lambda: "another")
-    assert source.digest != digest
+    key = source.key
+    assert source._replace(masks=True).key != key
+    monkeypatch.setattr(inputs, "digest", lambda *modules: "of other code")
+    assert source.key != key
     assert tracks._job(asked, case, tracks.HYBRID, 0).file not in jobs
 
 

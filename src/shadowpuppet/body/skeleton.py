@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -15,6 +15,14 @@ from shadowpuppet.geometry import Array
 
 AXES = {"x": (0, 1.0), "y": (1, 1.0), "z": (2, 1.0), "-x": (0, -1.0), "-y": (1, -1.0), "-z": (2, -1.0)}
 SIDES = ("left", "right")
+
+
+def other_side(names: Sequence[str]) -> list[int]:
+    """For each name, of a degree of freedom, a joint or a limb, the index of its counterpart on the other side of the body; its own index
+    in the middle."""
+    other = dict(zip(SIDES, SIDES[::-1]))
+    there = [name.partition("_") for name in names]
+    return [names.index(f"{other[side]}_{rest}") if side in other else n for n, (side, _, rest) in enumerate(there)]
 
 
 @dataclass(frozen=True)

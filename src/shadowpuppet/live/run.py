@@ -84,7 +84,7 @@ def run_live(folder: str | Path, options: Options | None = None, settings: LiveS
         with outlets, RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info) as run:
             session = _Live(run, options, settings, listener, display, clock, outlets)
             session.run()
-            smooth_run(run, session.subjects, options, listener, session.session.leans)
+            smooth_run(run, session.subjects, options, listener, run.motion, session.session.leans)
     except _Nobody:
         return None
     motion = read_run(folder).motion

@@ -18,7 +18,7 @@ from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter, write_metrics
 from shadowpuppet.jit import is_compiled
-from shadowpuppet.motion.motion import BLANK, MotionFrame
+from shadowpuppet.motion.motion import BLANK, Motion, MotionFrame
 from shadowpuppet.pipeline.look import Look, RigLook, Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
@@ -208,7 +208,7 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         listener.look(prepared.look)
         _check_cutoff(options, prepared.look.rate)
         leans = _track(writer, prepared, kind, options, listener, for_track, cache)
-        smooth_run(writer, [(0, prepared.check())], options, listener, leans)
+        smooth_run(writer, [(0, prepared.check())], options, listener, writer.motion, leans)
     written = read_run(folder)
     metrics = written.metrics | evaluated(rig, written.motion)
     metrics["verdict"] = verdict_of_run(prepared.look, written.motion).plain()
@@ -244,9 +244,9 @@ def _check_cutoff(options: Options, rate: float) -> None:
 
 
 def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]], options: Options, listener: Listener,
-               leans: Sequence[float] | None = None) -> None:
-    """Replace the tracked motion by the smoothed one: of each of `subjects` from its first frame to the next one's. If that is impossible,
-    the motion stays as it is, with a warning. `leans`: of the head in each frame (`TrackedSubject.lean`), if they are known."""
+               motion: Motion, leans: Sequence[float] | None = None) -> None:
+    """Replace the tracked motion of a run by `motion` smoothed: of each of `subjects` from its first frame to the next one's. If that is
+    impossible, the motion stays as it is, with a warning. `leans`: of the head in each frame (`TrackedSubject.lean`), if they are known."""
     method, gaps = options.smoothing
     if method == "off" and gaps == 0:
         writer.info["smoothing"] = {"method": "off"}
@@ -256,7 +256,7 @@ def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]]
     parts = [(begin, MotionSmoother(subject.body.skeleton, subject.joints, method, options.cutoff, gaps, away))
              for begin, subject in subjects]
     try:
-        found = smoothed_parts(writer.motion, parts, np.full(len(writer.motion), np.nan) if leans is None else np.array(leans))
+        found = smoothed_parts(motion, parts, np.full(len(motion), np.nan) if leans is None else np.array(leans))
     except (SettingsError, np.linalg.LinAlgError) as error:
         warn(f"the motion is not smoothed: {error}", ShadowPuppetWarning, stacklevel=3)
         writer.info["smoothing"] = {"method": "off"}

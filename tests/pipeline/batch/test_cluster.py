@@ -33,7 +33,8 @@ class DaskCluster:
 
     def worker_pids(self):
         """Of the processes that work; the nannies begin each again when it is lost."""
-        return [child.pid for nanny in self.nannies for child in psutil.Process(nanny.pid).children() if "spawn_main" in "".join(child.cmdline())]
+        children = [child for nanny in self.nannies for child in psutil.Process(nanny.pid).children()]
+        return [child.pid for child in children if "spawn_main" in "".join(child.cmdline())]
 
 
 @contextmanager

@@ -144,7 +144,7 @@ def test_where_a_person_faces_is_known_from_silhouettes_or_when_they_walk(scene,
     scene.sided, scene.measured = sided, measured
     scene.run(1.0, figure(0))
     (member,) = scene.group.members
-    assert member.is_sided == known
+    assert member.facing.is_known == known
     for n in range(20):
         scene.run(STEP, figure(0.1 * n))
-    assert member.is_sided
+    assert member.facing.is_known

@@ -1,4 +1,4 @@
-"""The people of a recording while it is tracked: who is there, who comes, who has left."""
+"""The people of a recording while it is tracked: those present, new ones, and those who have left."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from shadowpuppet.pipeline.person_rig import HullObservation, MultiviewSubject
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState
 from shadowpuppet.tracking.people.evidence import Drawn, draw_person, predicted
+from shadowpuppet.tracking.people.facing import Facing
 from shadowpuppet.tracking.people.figures import Figure, find_people
 from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.presence import Followed, follow
@@ -60,8 +61,8 @@ class Member:
     share: Share | None = None
     """The evidence of the last frame."""
     walk: Walk = field(default_factory=Walk)
-    is_sided: bool = True
-    """Whether it is known where the person faces: from the silhouettes at the beginning, or because they walked."""
+    facing: Facing = field(default_factory=Facing)
+    """Whether it is known which way the person faces: from the silhouettes at the beginning, or because they walked."""
 
     @property
     def observation(self) -> HullObservation:
@@ -73,7 +74,7 @@ class Member:
 
 @dataclass(eq=False)
 class Group:
-    """All people of a recording, those who have left too."""
+    """All people of a recording, also those who have left."""
 
     floor: Floor
     hull: VisualHull
@@ -91,8 +92,8 @@ class Group:
         self.members.append(Member(len(self.members) + 1, subject, self.rng.spawn(1)[0], None, height, place))
         return self.members[-1]
 
-    def start(self, points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
-        """Begin with those who were measured, each at the nearest figure of the first frame set, which is given as for `next`."""
+    def start(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
+        """Start the measured people, each at the nearest figure of the first frame set; arguments as for `next`."""
         figures = find_people(self.floor, masks)
         pairs = sorted((float(np.linalg.norm(figure.place - member.place)), member.number, n)
                        for member in self.members for n, figure in enumerate(figures))  # fmt: skip
@@ -100,11 +101,11 @@ class Group:
         for _, number, n in pairs:
             if number not in of and all(figures[n] is not figure for figure in of.values()):
                 of[number] = figures[n]
-        for _ in range(2):  # again for those who were not clear before the others were known
+        for _ in range(2):  # the second time for people who were hidden by others that were not known yet
             for number, figure in of.items():
                 member = self.members[number - 1]
                 if member.state is None or member.state.status != "tracked":
-                    self.begin(member, figure, self.drawn(), points, masks)
+                    self.begin(member, time, figure, self.drawn(), points, masks)
 
     @property
     def present(self) -> list[Member]:
@@ -117,7 +118,7 @@ class Group:
         return not self.coming and all(member.state is not None and member.state.status == "tracked" for member in self.present)
 
     def next(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
-        """Update everybody by a frame's surface points and masks (H, W), one per camera."""
+        """Update all people by a frame's surface points and masks (H, W), one per camera."""
         people = {member.number: Person(member.subject.tracker, member.rng, member.state)
                   for member in self.present if member.state is not None}  # fmt: skip
         for number, share in step(people, points, masks).items():
@@ -134,23 +135,25 @@ class Group:
                 member.state = member.share = member.lost_since = member.before = None
 
     def _face_the_way(self, member: Member, time: float) -> None:
-        """Turn a person round who has been carried backwards: beside others the front is hardly told from the back, but people walk
-        forwards."""
+        """Turn a person round whose body moves backwards: beside others the silhouettes hardly distinguish front and back, but people
+        walk forwards."""
         if member.state is None or member.share is None or member.lost_since is not None:
             member.walk.forget()
             return
         member.walk.add(step_of(member.subject.body, member.state.pose, time))
         if member.walk.forward > ALONG:
-            member.is_sided = True
+            member.facing.show(time, wrong=False)
         elif member.walk.forward < -ALONG:
             member.walk.forget()
             turned = turn_round(member.subject.tracker, member.rng, member.share)
-            member.is_sided = turned is not None
-            if turned is not None:
+            if turned is None:
+                member.facing.is_known = False
+            else:
+                member.facing.show(time, wrong=True)
                 member.state, member.share = turned, member.share._replace(state=turned)
 
     def _look(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
-        """Find those who come, or come back, or were lost, among the figures."""
+        """Find new, returning and lost people among the figures that no tracked body explains."""
         drawn = {member.number: member.share.drawn for member in self.present if member.share is not None and member.lost_since is None}
         figures = find_people(self.floor, masks, explained(drawn, len(masks)))
         places = [place_of(member.subject.body, member.state) for member in self.present
@@ -161,13 +164,14 @@ class Group:
         self.coming = follow([each for each in self.coming if time - each.times[-1] <= FORGET_SECONDS], self.looks, time, free)
         for each in list(self.coming):
             if len(each.sets) >= NEW_LOOKS and each.times[-1] == time and time - each.times[0] >= NEW_SECONDS - 1e-6:
-                self._enter(each, drawn, points, masks)
+                self._enter(each, time, drawn, points, masks)
                 self.coming.remove(each)
         oldest = min((each.sets[0] for each in self.coming), default=self.looks)
         self.seen = {n: seen for n, seen in self.seen.items() if n >= oldest}
 
-    def _enter(self, found: Followed, drawn: dict[int, Drawn], points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
-        """Begin to track a person: one who was lost there, one who has left and is as tall, or a new one."""
+    def _enter(self, found: Followed, time: float, drawn: dict[int, Drawn], points: SurfacePoints,
+               masks: Sequence[Mask | None]) -> None:
+        """Start tracking the person of a figure: a lost one near it, one of that height who has left, or a new one."""
         figure = found.figures[-1]
         member = self._known(figure, found.height)
         if member is None:
@@ -175,20 +179,20 @@ class Group:
                 member = self.add(self.fit(self.rng, seen_in(found, self.seen)), found.height, figure.place)
             except TrackingError:
                 return
-        self.begin(member, figure, drawn, points, masks)
+        self.begin(member, time, figure, drawn, points, masks)
 
-    def begin(self, member: Member, figure: Figure, drawn: dict[int, Drawn], points: SurfacePoints,
+    def begin(self, member: Member, time: float, figure: Figure, drawn: dict[int, Drawn], points: SurfacePoints,
               masks: Sequence[Mask | None]) -> None:
         """Find a person's pose at the place of a figure, beside those who are `drawn`."""
         others = {number: body for number, body in drawn.items() if number != member.number}
         begun = start(member.subject.tracker, member.rng, figure, others, points, masks)
         if begun is not None and begun.state.status != "lost":
             member.state, member.lost_since, member.before = begun.state, None, None
-            member.is_sided = begun.is_sided and member.subject.is_measured
+            member.facing.begin(time, begun.is_sided and member.subject.is_measured)
             member.walk.forget()
 
     def _known(self, figure: Figure, height: float) -> Member | None:
-        """Who of those lost or gone may have come back; None for nobody."""
+        """The lost or absent person that a figure may be; None: a new person."""
         away = [member for member in self.members if member.state is None or member.lost_since is not None]
         alike = [member for member in away if abs(member.height - height) <= SAME_HEIGHT]
 
@@ -200,7 +204,7 @@ class Group:
         return min(alike, key=distance, default=None)
 
     def drawn(self) -> dict[int, Drawn]:
-        """The bodies of those who are there, as they are expected in the next frame."""
+        """The bodies of the people present, as predicted for the next frame."""
         return {member.number: draw_person(member.subject.tracker, predicted(member.subject.body, member.state))
                 for member in self.present if member.state is not None}  # fmt: skip
 

@@ -12,6 +12,7 @@ from warnings import warn
 
 import numpy as np
 
+from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.rasterize import Bits
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.motion.motion_files import read_truth
@@ -49,8 +50,8 @@ from shadowpuppet.video import write_frames
 
 SAME_PERSON = 0.5
 """Greatest median distance (m) of a tracked person from a truth that is theirs."""
-Smooth = Callable[[RunWriter, Sequence[tuple[int, MultiviewSubject]], Options, Listener], None]
-"""Replaces the motion of a run by the smoothed one."""
+Smooth = Callable[[RunWriter, Sequence[tuple[int, MultiviewSubject]], Options, Listener, Motion], None]
+"""Replaces the motion of a run by a given one, smoothed."""
 
 
 def check_people(options: Options, resume: bool) -> None:
@@ -74,21 +75,23 @@ class PeopleRun:
     listener: Listener
 
     def __post_init__(self) -> None:
-        """Nobody is there yet."""
+        """Start without people."""
         self.rig: Rig = self.survey.rig
         self.writers = dict[int, RunWriter]()
         self.metrics = dict[str, Any]()
 
     def track(self, for_fit: np.random.Generator, for_track: np.random.Generator, smooth: Smooth) -> dict[int, dict[str, Any]]:
-        """Track everybody; returns each person's metrics. Raises `TrackingError` if nobody is found."""
+        """Track all people; returns each person's metrics by number, none if no person is found."""
         self.listener.begin(f"measuring {self.census.number} people")
         group = self._group(for_fit, for_track)
         with ExitStack() as stack:
             self._follow(group, stack)
             for member in group.members:
                 if member.number in self.writers:
-                    writer = self.writers[member.number]
-                    smooth(writer, [(0, member.subject)], self.options, self.listener)
+                    writer, subject = self.writers[member.number], member.subject
+                    assert isinstance(subject.person.sizes, BoneSizes)  # of a whole body
+                    motion = member.facing.corrected(writer.motion, subject.body, subject.person.sizes)
+                    smooth(writer, [(0, subject)], self.options, self.listener, motion)
             truths = matched_truths({n: writer.motion for n, writer in self.writers.items()}, self.rig.recording.truths)
             for n, truth in truths.items():
                 self.writers[n].info["truth"] = str(truth.resolve())
@@ -108,7 +111,7 @@ class PeopleRun:
         return metrics
 
     def _group(self, for_fit: np.random.Generator, for_track: np.random.Generator) -> Group:
-        """Everybody who is there in the first seconds, measured."""
+        """The people of the first seconds, measured."""
         rate, floor = self.rig.rate / self.options.every, self.census.floor
         first = self.survey.first
 
@@ -126,7 +129,7 @@ class PeopleRun:
         return group
 
     def _follow(self, group: Group, stack: ExitStack) -> None:
-        """For each frame set: silhouettes, the hull, everybody's state, and what is written of it."""
+        """For each frame set: segment, compute the hull, update all people, write."""
         survey, options, timer = self.survey, self.options, StageTimer()
         look = survey.look
         assert isinstance(look, RigLook)
@@ -149,7 +152,7 @@ class PeopleRun:
                 with timer.time("track"):
                     if not begun and len(points.points):
                         begun = True
-                        group.start(points, masks)
+                        group.start(seen.time, points, masks)
                     group.next(seen.time, points, masks)
                     drawn = [member.subject.drawn(member.state) for member in group.present]
                     watch.tracked(_together(drawn) if group.is_clear else ())
@@ -165,12 +168,12 @@ class PeopleRun:
 
     @staticmethod
     def _doubted(frame: MotionFrame) -> MotionFrame:
-        """The frame of a person whose front is not told from the back: nothing of it is `tracked`."""
+        """The frame of a person who may face the other way: nothing of it is `tracked`."""
         limbs = None if frame.limb_status is None else ["uncertain" if status == "tracked" else status for status in frame.limb_status]
         return frame._replace(status="uncertain" if frame.status == "tracked" else frame.status, limb_status=limbs)
 
     def _write(self, group: Group, seen: FrameSet, stack: ExitStack, places: BinaryIO) -> dict[int, MotionFrame]:
-        """Write a frame of everybody who has come so far."""
+        """Write a frame of each person found so far."""
         found = dict[int, MotionFrame]()
         for member in group.members:
             if member.state is None and member.number not in self.writers:
@@ -179,7 +182,9 @@ class PeopleRun:
                 frame, member.before = MotionFrame(seen.time, "absent"), None
             else:
                 frame, member.before = motion_frame(member.subject, seen.time, member.state, member.observation, member.before)
-                frame = frame if member.is_sided else self._doubted(frame)
+                if not member.facing.is_known:
+                    member.facing.doubted[frame.time] = frame
+                    frame = self._doubted(frame)
             self._writer(member, stack).write(frame)
             here = frame.status not in ("absent", "lost") and member.state is not None
             place = place_of(member.subject.body, member.state) if here and member.state is not None else np.full(2, np.nan)

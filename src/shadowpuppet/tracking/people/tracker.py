@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
@@ -69,8 +70,8 @@ class Share(NamedTuple):
 def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Mask | None]) -> dict[int, Share]:
     """The people's states after a frame's surface points and masks (H, W), one per camera, of all of them together.
 
-    One after the other, each on what the others' bodies leave: in their new poses, or the predicted ones of those whose turn is to come.
-    Nobody knows where a lost person's body is, so it explains nothing.
+    One person after another, each on the evidence that the others' bodies do not explain: bodies updated before in their new poses, the
+    rest in their predicted ones. A lost person's body explains nothing.
     """
     drawn = {n: draw_person(person.tracker, predicted(person.tracker.body, person.state)) for n, person in people.items()}
     states, lost = dict[int, MultiviewState](), {n for n, person in people.items() if person.state.status == "lost"}
@@ -102,7 +103,7 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
     found = person.search(rng, PersonObservation(person.views, own, [None] * len(masks)))  # the points alone: where the person is
     body = draw_person(person, found.pose)
     observation = PersonObservation(person.views, own, masks, None, ignored_pixels(body, list(drawn.values()), masks))
-    found = person.search(rng, observation)  # beside others the front is hardly told from the back: both are tried
+    found = person.search(rng, observation)  # beside others front and back hardly differ: both are tried
     other = _facing_the_other_way(person, rng, found, observation)
     best = max(found, other, key=lambda state: np.nan_to_num(state.overlap))
     return Begun(_judged(best), bool(abs(found.overlap - other.overlap) >= SIDED))
@@ -122,13 +123,8 @@ def _facing_the_other_way(person: MultiviewTracker, rng: np.random.Generator, st
 
 def _turned_round(person: MultiviewTracker, state: MultiviewState) -> MultiviewState:
     """A state with the body turned to face the other way; the arms and legs of one side are those of the other."""
-    skeleton, pose = person.body.skeleton, state.pose.copy()
-    names = skeleton.dof_names
-    sides = ("left_", "right_")
-    for n, name in enumerate(names):
-        for one, other in (sides, sides[::-1]):
-            if name.startswith(one):
-                pose[n] = state.pose[names.index(other + name.removeprefix(one))]
+    skeleton = person.body.skeleton
+    pose = state.pose[other_side(skeleton.dof_names)]
     pose[skeleton.dof_indices(GLOBAL_DOFS[3:])[0]] += np.pi
     still = np.zeros_like(pose)
     particles = Particles(np.repeat(pose[None], person.number, 0), *np.zeros((2, person.number)))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.body.upper_body import BEND, TWIST
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import filled, true_runs
@@ -90,10 +90,10 @@ def turned_on(motion: Motion, away: bool = False, leans: Array | None = None) ->
     for dof in (twist, bend):
         poses[wrong, dof] *= -1
     poses[motion.known, twist] = np.unwrap(poses[motion.known, twist])
-    limbs[mirrored] = limbs[mirrored][:, _exchanged(limbs_of(motion.joint_names))]
+    limbs[mirrored] = limbs[mirrored][:, other_side(limbs_of(motion.joint_names))]
     pose_sd, joint_sd = motion.pose_sd.copy(), motion.joint_sd.copy()
-    pose_sd[mirrored] = pose_sd[mirrored][:, _exchanged(motion.dof_names)]
-    joint_sd[mirrored] = joint_sd[mirrored][:, _exchanged(motion.joint_names)]
+    pose_sd[mirrored] = pose_sd[mirrored][:, other_side(motion.dof_names)]
+    joint_sd[mirrored] = joint_sd[mirrored][:, other_side(motion.joint_names)]
     return Faced(replace(motion, poses=poses, pose_sd=pose_sd, joint_sd=joint_sd, limb_status=limbs), mirrored, wrong)
 
 
@@ -122,14 +122,7 @@ def _around(inside: NDArray[np.bool_], frame: int) -> slice:
 def mirror(names: tuple[str, ...], poses: Array) -> Array:
     """Poses (T, D) of an upper body, its degrees of freedom named `names`, mirrored in depth: the silhouette is the same but for
     perspective."""
-    out = poses[:, _exchanged(names)]
+    out = poses[:, other_side(names)]
     twist, bend = names.index(TWIST), names.index(BEND)
     out[:, twist], out[:, bend] = np.pi - out[:, twist], -out[:, bend]
     return out
-
-
-def _exchanged(names: tuple[str, ...]) -> list[int]:
-    """For each name the index of its counterpart on the other side."""
-    other = dict(zip(SIDES, SIDES[::-1]))
-    there = [name.partition("_") for name in names]
-    return [names.index(f"{other[side]}_{rest}") if side in other else n for n, (side, _, rest) in enumerate(there)]

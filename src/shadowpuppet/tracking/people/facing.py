@@ -1,0 +1,87 @@
+"""Which way people face, for the frames before it is known.
+
+Beside others the silhouettes hardly tell a person's front from the back. Once the person walks the front is known, and so it is for the
+frames before: those in which the body faced the wrong way are corrected when the run ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.sizes import BoneSizes
+from shadowpuppet.body.skeleton import other_side
+from shadowpuppet.geometry import Array
+from shadowpuppet.motion.inverse_kinematics import fit_poses
+from shadowpuppet.motion.motion import JointTable, Motion, MotionFrame
+
+
+class Part(NamedTuple):
+    """A part of a person's motion, from one search on."""
+
+    begin: float
+    """Seconds."""
+    until: float = np.nan
+    """Time (s) at which the person's walk showed the front; not a number: it never did, or it was known from the beginning."""
+    wrong: bool = False
+    """Whether the body faced the wrong way until then."""
+
+
+@dataclass(eq=False)
+class Facing:
+    """What is known about the front of one person over time."""
+
+    parts: list[Part] = field(default_factory=list)
+    is_known: bool = True
+    """Whether it is known now."""
+    doubted: dict[float, MotionFrame] = field(default_factory=dict)
+    """Frames, by time (s), as they would be if the front were known."""
+
+    def begin(self, time: float, is_known: bool) -> None:
+        """The person was found at a time (s), so that the body may face another way than before."""
+        self.parts.append(Part(time))
+        self.is_known = is_known
+
+    def show(self, time: float, wrong: bool) -> None:
+        """The person's walk shows the front at a time (s); `wrong`: the body is turned round now."""
+        if not self.is_known and self.parts and np.isnan(self.parts[-1].until):
+            self.parts[-1] = self.parts[-1]._replace(until=time, wrong=wrong)
+        self.is_known = True
+
+    def known_later(self, times: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Frames (T,) in which the front was not known yet, and is known from a later frame; those of them that face the wrong way."""
+        known, wrong = np.zeros((2, len(times)), bool)
+        for part in self.parts:
+            before = (part.begin <= times) & (times < part.until)
+            known |= before
+            wrong |= before & part.wrong
+        return known, wrong
+
+    def corrected(self, motion: Motion, body: Body, sizes: BoneSizes) -> Motion:
+        """The person's motion with what is known later: the sides of frames that face the wrong way are exchanged, and the body of these
+        sizes fitted to the joints; frames doubted for their front alone get the status that they would have had."""
+        known, wrong = self.known_later(motion.times)
+        wrong &= motion.known
+        out = _exchanged(motion, wrong, body, sizes) if wrong.any() else motion
+        status, limbs = out.status.copy(), out.limb_status.copy()
+        for n in np.flatnonzero(known & ~wrong):
+            if (frame := self.doubted.get(float(motion.times[n]))) is not None and frame.limb_status is not None:
+                status[n], limbs[n] = frame.status, frame.limb_status
+        return replace(out, status=status, limb_status=limbs)
+
+
+def _exchanged(motion: Motion, frames: NDArray[np.bool_], body: Body, sizes: BoneSizes) -> Motion:
+    """A motion in which the joints of some frames (T,) are those of the other side, in poses that reach them."""
+    joints, poses = motion.joints.copy(), motion.poses.copy()
+    joints[frames] = joints[frames][:, other_side(motion.joint_names)]
+    fitted = fit_poses(JointTable(motion.times[frames], motion.joint_names, joints[frames]), body.name, sizes)
+    poses[frames] = fitted.poses
+    joints[frames] = body.points(fitted.poses)
+    joint_sd, pose_sd = motion.joint_sd.copy(), motion.pose_sd.copy()
+    joint_sd[frames] = joint_sd[frames][:, other_side(motion.joint_names)]
+    pose_sd[frames] = pose_sd[frames][:, other_side(motion.dof_names)]
+    return replace(motion, poses=poses, joints=joints, joint_sd=joint_sd, pose_sd=pose_sd)

@@ -1,0 +1,83 @@
+"""Frames before a walk that showed the front: the sides of those that faced the wrong way are exchanged, others get their status."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.skeleton import other_side
+from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
+from shadowpuppet.tracking.people.facing import Facing
+
+SIZES = average_sizes("anatomical", 1.75)
+BODY = make_body("anatomical", SIZES)
+TIMES = np.arange(12) / 10
+
+
+def walk() -> Motion:
+    """Somebody who walks with swinging arms and bent knees; doubted throughout."""
+    built = MotionBuilder(BODY.name, BODY.skeleton.dof_names, BODY.landmark_names)
+    for n, time in enumerate(TIMES):
+        pose = BODY.skeleton.pose(root_x=0.1 * n, root_z=0.95, root_heading=0.0, left_hip_y=-0.4 + 0.05 * n, left_knee_flexion=0.5,
+                                  right_hip_y=0.2 - 0.03 * n, right_elbow_flexion=0.7, left_shoulder_y=0.3)  # fmt: skip
+        sd = np.arange(len(BODY.landmark_names) * 3).reshape(-1, 3) / 1000
+        built.append(MotionFrame(time, "uncertain", pose, BODY.points(pose[None])[0], np.abs(pose) + 0.1, sd, 0.0, 0.9))
+    return built.build()
+
+
+def as_taken_the_wrong_way(motion: Motion, frames: slice) -> Motion:
+    """What a tracker sees that takes the back for the front: the joints of the other side where the person's are."""
+    joints = motion.joints.copy()
+    joints[frames] = joints[frames][:, other_side(motion.joint_names)]
+    return replace(motion, joints=joints)
+
+
+def test_the_sides_of_frames_that_face_the_wrong_way_are_exchanged():
+    truth, facing = walk(), Facing()
+    facing.begin(TIMES[0], is_known=False)
+    facing.show(TIMES[8], wrong=True)
+    found = facing.corrected(as_taken_the_wrong_way(truth, slice(0, 8)), BODY, SIZES)
+    assert np.linalg.norm(found.joints - truth.joints, axis=2).mean() < 0.01
+    assert np.abs(found.poses[:8] - truth.poses[:8]).max() > 0  # fitted anew
+    np.testing.assert_array_equal(found.poses[8:], truth.poses[8:])
+    left, right = (truth.joint_names.index(f"{side}_knee") for side in ("left", "right"))
+    np.testing.assert_array_equal(found.joint_sd[:8, left], truth.joint_sd[:8, right])
+    np.testing.assert_array_equal(found.joint_sd[8:], truth.joint_sd[8:])
+    assert (found.status == "uncertain").all()
+
+
+def test_frames_that_faced_the_right_way_get_the_status_that_they_would_have_had():
+    truth, facing = walk(), Facing()
+    facing.begin(TIMES[0], is_known=False)
+    for time in TIMES[:5]:
+        facing.doubted[float(time)] = MotionFrame(float(time), "tracked", limb_status=["tracked"] * (len(truth.limbs) - 1) + ["uncertain"])
+    facing.show(TIMES[5], wrong=False)
+    found = facing.corrected(truth, BODY, SIZES)
+    assert found.status.tolist() == ["tracked"] * 5 + ["uncertain"] * 7
+    assert (found.limb_status[:5, -1] == "uncertain").all()
+    np.testing.assert_array_equal(found.poses, truth.poses)
+
+
+@pytest.mark.parametrize("sure", [True, False])
+def test_what_is_not_known_stays(sure):
+    """The front was known from the beginning, or never."""
+    truth, facing = walk(), Facing()
+    facing.begin(TIMES[0], is_known=sure)
+    if sure:
+        facing.show(TIMES[6], wrong=True)
+    found = facing.corrected(truth, BODY, SIZES)
+    np.testing.assert_array_equal(found.joints, truth.joints)
+    assert found.status.tolist() == truth.status.tolist()
+
+
+def test_only_the_part_since_the_last_search_is_corrected():
+    truth, facing = walk(), Facing()
+    facing.begin(TIMES[0], is_known=False)
+    facing.begin(TIMES[4], is_known=False)
+    facing.show(TIMES[8], wrong=True)
+    facing.show(TIMES[10], wrong=True)  # the first says what was before
+    known, wrong = facing.known_later(truth.times)
+    assert known.tolist() == wrong.tolist() == [False] * 4 + [True] * 4 + [False] * 4
