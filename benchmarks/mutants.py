@@ -59,7 +59,7 @@ def main() -> int:
     parser.add_argument("--under", type=Path, default=PACKAGE, help="module, or folder of modules, to change")
     parser.add_argument("--seconds", type=float, default=300, help="time after which a test counts as hanging")
     parser.add_argument("--again", type=Path, help="what an earlier run printed: its survivors instead of random ones")
-    parser.add_argument("--near", action="store_true", help="only the tests' files that name the module: a first look, in a tenth of the time")
+    parser.add_argument("--near", action="store_true", help="only the tests that name the module: a first look, in a tenth of the time")
     args = smallest.parse(parser, lambda folder: ["--number", 1, "--under", PACKAGE / "errors.py"])
     modules = [args.under.resolve()] if args.under.is_file() else sorted(args.under.resolve().rglob("*.py"))
     found = [mistake for module in modules if "scripts" not in module.parts for mistake in mistakes(module)]

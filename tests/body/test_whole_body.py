@@ -255,8 +255,9 @@ def test_the_likeliest_stature_is_between_those_of_the_bones_nearer_to_the_surer
     assert stature_of(lengths) == pytest.approx(grid[unlikely.argmin()], abs=1e-4)
 
 
-@pytest.mark.parametrize(("height", "fits", "hint"), [(1.75, True, ""), (0.5, True, ""), (2.5, True, ""), (2.51, False, ""), (0.4, False, ""),
-                                                      (175, False, " (175 cm are 1.75)"), (True, False, ""), ("1.75", False, "")])
+@pytest.mark.parametrize(("height", "fits", "hint"), [
+    (1.75, True, ""), (0.5, True, ""), (2.5, True, ""), (2.51, False, ""), (0.4, False, ""), (175, False, " (175 cm are 1.75)"),
+    (True, False, ""), ("1.75", False, "")])  # fmt: skip
 def test_heights_are_metres_and_centimetres_get_a_hint(height, fits, hint):
     assert is_within(height, HEIGHTS) == fits
     assert expected_metres(height, HEIGHTS) == f"expected 0.5 to 2.5 metres{hint}"

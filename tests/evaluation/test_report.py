@@ -19,7 +19,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import app as cli
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.evaluation import Comparison, measure_run
-from shadowpuppet.evaluation.report.charts import POINTS, _binned, by_joint_and_time
+from shadowpuppet.evaluation.report.charts import POINTS, _binned, by_joint_and_time, fit_over_time
 from shadowpuppet.evaluation.report.page import page, write_report
 from shadowpuppet.evaluation.report.pictures import _side_by_side, draw_bones, pictures, report_frames
 from shadowpuppet.geometry import rigid
@@ -233,6 +233,11 @@ def grey_share(svg: str) -> float:
     assert found is not None
     image = cv2.imdecode(np.frombuffer(base64.b64decode(found[1]), np.uint8), cv2.IMREAD_COLOR)
     return float((np.abs(image.astype(int) - [0x78, 0x70, 0x6B]).max(2) < 6).mean())
+
+
+def test_overlaps_are_drawn_up_to_one(tmp_path):
+    numbers = re.findall(r">(\d\.\d+)<", fit_over_time(measure_run(run_that_errs(tmp_path))))
+    assert max(map(float, numbers[: numbers.index("0.0")])) == 1.0  # from 0.0 on those of cost and time
 
 
 def test_a_curve_of_many_frames_is_drawn_as_means_of_neighbours():
