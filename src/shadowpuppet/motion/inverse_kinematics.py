@@ -81,19 +81,22 @@ class FittedPoses:
         return self.distances[:, [not name.endswith("_hand") for name in self.joints.names]]
 
 
-def fit_poses(joints: JointTable, body: str = "anatomical", sizes: BoneSizes | None = None, source: str = "joints") -> FittedPoses:
+def fit_poses(joints: JointTable, body: str = "anatomical", sizes: BoneSizes | None = None, source: str = "joints",
+              any_bend: bool = False) -> FittedPoses:
     """Poses of a whole body, and the person's sizes if none are given, from joints over time.
 
     Args:
         joints: in the world, metres, Z up; any of the 17 joints of a body, among them shoulders, elbows, knees, and the pelvis or both
             hips. Frames may lack joints.
         source: the name of the joints in messages.
+        any_bend: whether joints may bend as no person's do, so that the nearest possible pose is wanted.
 
     Raises `ShadowPuppetError` if joints are missing, not in metres, upside down or mirrored, or the body is not a whole one.
     """
     if body not in WHOLE:
         raise ShadowPuppetError(f"body {body!r}: found a body without legs or none, expected one of {choices(WHOLE)}")
-    check_person(joints, source)
+    if not any_bend:
+        check_person(joints, source)
     person = sizes or whole_sizes_from_bones(sizes_kind(body), _bone_lengths(joints))  # pyright: ignore[reportArgumentType]
     start = make_body(body, person)
     table = joints.select([name for name in start.landmark_names if name in joints.names])

@@ -24,7 +24,7 @@ def figure(x: float, height: float = 1.7) -> Figure:
 @pytest.fixture
 def scene(monkeypatch):
     """A group whose trackers follow people to their figure, and are lost where there is none; `figures` are those seen now."""
-    now = SimpleNamespace(figures=[], fits=0, refuse=False, facing=np.array([1.0, 0.0]), sided=True, measured=True)
+    now = SimpleNamespace(figures=[], fits=0, refuse=False, facing=np.array([1.0, 0.0]), sided=True, measured=True, lead=0.0)
 
     def fit(rng, sets):
         if now.refuse:
@@ -40,13 +40,19 @@ def scene(monkeypatch):
         for number, person in people.items():
             near = abs(place(person.state)[0] - person.state.place[0]) < 0.4
             where = place(person.state) if near else person.state.place
-            state = SimpleNamespace(place=where, pose=where, status="tracked" if near else "lost")
+            state = SimpleNamespace(place=where, pose=where, status="tracked" if near else "lost", overlap=0.8)
             found[number] = Share(state, None, [], None)
         return found
 
     def start(tracker, rng, figure, drawn, points, masks):
-        return Begun(SimpleNamespace(place=figure.place, pose=figure.place, status="tracked"), now.sided)
+        return Begun(SimpleNamespace(place=figure.place, pose=figure.place, status="tracked", overlap=0.8), now.sided)
 
+    def other(tracker, rng, *given):
+        state = next(each.state for each in given if isinstance(each, Share))
+        return SimpleNamespace(place=state.place, pose=state.pose, status="tracked", overlap=state.overlap - now.lead, is_other=True)
+
+    monkeypatch.setattr(module, "turn_round", other)
+    monkeypatch.setattr(module, "follow_turned", other)
     monkeypatch.setattr(module, "find_people", lambda floor, masks, explained=(): list(now.figures))
     monkeypatch.setattr(module, "explained", lambda drawn, number: [])
     monkeypatch.setattr(module, "place_of", lambda body, state: state.place)
@@ -129,7 +135,7 @@ def test_who_is_carried_backwards_is_turned_round_if_that_fits(scene, monkeypatc
         if fits:
             turned.append(share)
             scene.facing = -scene.facing
-        return share.state if fits else None
+        return SimpleNamespace(**vars(share.state) | {"overlap": 0.78 if fits else 0.7})
 
     monkeypatch.setattr(module, "turn_round", turn)
     scene.run(1.0, figure(0))
@@ -148,3 +154,32 @@ def test_where_a_person_faces_is_known_from_silhouettes_or_when_they_walk(scene,
     for n in range(20):
         scene.run(STEP, figure(0.1 * n))
     assert member.facing.is_known
+
+
+@pytest.mark.parametrize(("lead", "known", "turned"), [(0.05, True, False), (-0.05, True, True), (0.01, False, False)])
+def test_who_stands_is_followed_both_ways_until_one_is_better(scene, lead, known, turned):
+    scene.sided, scene.lead = False, lead
+    scene.run(1.0, figure(0))
+    (member,) = scene.group.members
+    assert member.trial is not None
+    states = []
+    for _ in range(20):
+        scene.run(STEP, figure(0))
+        states.append(member.share.state)
+    assert member.facing.is_known == known
+    assert any(hasattr(state, "is_other") for state in states) == turned
+    assert [part.wrong for part in member.facing.parts] == [turned]
+    assert np.isnan(member.facing.parts[0].until) != known
+
+
+def test_a_sudden_turn_raises_doubt_until_it_is_tried(scene):
+    scene.lead = 0.05
+    scene.run(2.0, figure(0))
+    (member,) = scene.group.members
+    assert member.facing.is_known
+    scene.facing = -scene.facing
+    scene.run(2 * STEP, figure(0))
+    assert not member.facing.is_known
+    scene.run(2.0, figure(0))
+    assert member.facing.is_known
+    assert len(member.facing.parts) == 2

@@ -53,3 +53,15 @@ def test_the_body_faces_where_its_toes_point(heading):
     np.testing.assert_allclose(step.place, [0.7, 0.0])
     feet = sum(at[f"{side}_toe"] - at[f"{side}_heel"] for side in ("left", "right"))[:2]
     np.testing.assert_allclose(feet / np.linalg.norm(feet), step.facing, atol=0.05)
+
+
+@pytest.mark.parametrize(("seconds", "angle", "quick"), [(0.4, np.pi, True), (1.2, np.pi, False), (0.4, np.pi / 2, False)])
+def test_a_body_that_turns_more_quickly_than_people_is_noticed(seconds, angle, quick):
+    walk, noticed = Walk(), []
+    for n in range(40):
+        heading = angle * np.clip((n / 15 - 1.0) / seconds, 0, 1)
+        walk.add(Step(n / 15, np.zeros(2), np.array([np.cos(heading), np.sin(heading)])))
+        noticed.append(walk.jerked)
+    since = [time for time in noticed if time is not None]
+    assert bool(since) == quick
+    assert all(0.8 < time < 1.0 + seconds for time in since)

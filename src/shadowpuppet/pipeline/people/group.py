@@ -15,13 +15,15 @@ from shadowpuppet.pipeline.person_rig import HullObservation, MultiviewSubject
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState
 from shadowpuppet.tracking.people.evidence import Drawn, draw_person, predicted
-from shadowpuppet.tracking.people.facing import Facing
+from shadowpuppet.tracking.people.facing import LONGEST_TRIAL, Facing, Trial
 from shadowpuppet.tracking.people.figures import Figure, find_people
 from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.presence import Followed, follow
-from shadowpuppet.tracking.people.tracker import Person, Share, explained, place_of, start, step, turn_round
+from shadowpuppet.tracking.people.tracker import Person, Share, explained, follow_turned, place_of, start, step, turn_round
 from shadowpuppet.tracking.people.walking import ALONG, Walk, step_of
 
+TURN_LOSS = 0.05
+"""Overlap by which a body turned round may fit worse if the person walks that way: among others front and back differ by 0.02."""
 LOOK_SECONDS = 0.2
 """Seconds from one look for people to the next."""
 NEW_SECONDS, NEW_LOOKS = 0.5, 3
@@ -61,6 +63,8 @@ class Member:
     share: Share | None = None
     """The evidence of the last frame."""
     walk: Walk = field(default_factory=Walk)
+    trial: Trial | None = None
+    """The person facing the other way, while it is not known which way is right."""
     facing: Facing = field(default_factory=Facing)
     """Whether it is known which way the person faces: from the silhouettes at the beginning, or because they walked."""
 
@@ -139,18 +143,47 @@ class Group:
         walk forwards."""
         if member.state is None or member.share is None or member.lost_since is not None:
             member.walk.forget()
+            member.trial = None
             return
         member.walk.add(step_of(member.subject.body, member.state.pose, time))
+        if (since := member.walk.jerked) is not None:
+            member.facing.begin(since, is_known=False)
+            member.walk.forget()
+            member.trial = None
         if member.walk.forward > ALONG:
             member.facing.show(time, wrong=False)
         elif member.walk.forward < -ALONG:
             member.walk.forget()
             turned = turn_round(member.subject.tracker, member.rng, member.share)
-            if turned is None:
-                member.facing.is_known = False
+            if np.nan_to_num(member.state.overlap) - np.nan_to_num(turned.overlap) <= TURN_LOSS:
+                self._turn(member, time, turned)
             else:
-                member.facing.show(time, wrong=True)
-                member.state, member.share = turned, member.share._replace(state=turned)
+                member.facing.is_known = False
+        self._try_both_ways(member, member.share, time)
+
+    def _try_both_ways(self, member: Member, share: Share, time: float) -> None:
+        """Follow a person of unknown front as facing the other way too, until that is clearly better or worse."""
+        tracker, trial = member.subject.tracker, member.trial
+        if member.facing.is_known:
+            member.trial = None
+        elif trial is None or time - trial.begun > LONGEST_TRIAL:
+            member.trial = Trial(time, turn_round(tracker, member.rng, share))
+        else:
+            trial.add(time, follow_turned(tracker, member.rng, trial.state, share), share.state.overlap)
+            if (right := trial.is_right(time)) is not None:
+                member.trial = None
+                if right:
+                    member.facing.show(time, wrong=False)
+                else:
+                    self._turn(member, time, trial.state)
+
+    @staticmethod
+    def _turn(member: Member, time: float, turned: MultiviewState) -> None:
+        """Replace a person's state by that of the body turned round, which is right."""
+        assert member.share is not None
+        member.facing.show(time, wrong=True)
+        member.walk.forget()
+        member.state, member.share = turned, member.share._replace(state=turned)
 
     def _look(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
         """Find new, returning and lost people among the figures that no tracked body explains."""

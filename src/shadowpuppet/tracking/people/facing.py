@@ -1,7 +1,8 @@
-"""Which way people face, for the frames before it is known.
+"""Which way people face, where it is not known.
 
-Beside others the silhouettes hardly tell a person's front from the back. Once the person walks the front is known, and so it is for the
-frames before: those in which the body faced the wrong way are corrected when the run ends.
+Beside others one frame's silhouettes hardly distinguish a person's front from the back. A second of them does, if the person is also
+followed as facing the other way (`Trial`), or the person walks. From then on the front is known, and so it is for the frames before: those
+in which the body faced the wrong way are corrected when the run ends.
 """
 
 from __future__ import annotations
@@ -18,6 +19,34 @@ from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable, Motion, MotionFrame
+from shadowpuppet.tracking.multiview.tracker import MultiviewState
+
+SETTLING, LEAST_TRIAL, LONGEST_TRIAL = 0.4, 1.0, 3.0
+"""Seconds after which the overlaps of a trial count; from which on it is decided; after which it begins again."""
+CLEARLY = 0.02
+"""Least mean difference of the overlaps that decides."""
+
+
+class Trial:
+    """A person who is also followed as facing the other way."""
+
+    def __init__(self, time: float, state: MultiviewState) -> None:
+        """`state`: of the body turned round, at a time (s)."""
+        self.begun, self.state = time, state
+        self._leads = list[float]()
+
+    def add(self, time: float, state: MultiviewState, overlap: float) -> None:
+        """The next state of the body turned round, and the overlap of the body as it is."""
+        self.state = state
+        if time - self.begun >= SETTLING:
+            self._leads.append(float(np.nan_to_num(overlap) - np.nan_to_num(state.overlap)))
+
+    def is_right(self, time: float) -> bool | None:
+        """Whether the body as it is faces the right way; None if that is not clear yet."""
+        if time - self.begun < LEAST_TRIAL or not self._leads:
+            return None
+        lead = float(np.mean(self._leads))
+        return lead > 0 if abs(lead) >= CLEARLY else None
 
 
 class Part(NamedTuple):
@@ -26,7 +55,7 @@ class Part(NamedTuple):
     begin: float
     """Seconds."""
     until: float = np.nan
-    """Time (s) at which the person's walk showed the front; not a number: it never did, or it was known from the beginning."""
+    """Time (s) from which on the front was known; not a number: it never did, or it was known from the beginning."""
     wrong: bool = False
     """Whether the body faced the wrong way until then."""
 
@@ -47,7 +76,7 @@ class Facing:
         self.is_known = is_known
 
     def show(self, time: float, wrong: bool) -> None:
-        """The person's walk shows the front at a time (s); `wrong`: the body is turned round now."""
+        """The front is known from a time (s) on; `wrong`: the body is turned round now."""
         if not self.is_known and self.parts and np.isnan(self.parts[-1].until):
             self.parts[-1] = self.parts[-1]._replace(until=time, wrong=wrong)
         self.is_known = True
@@ -78,7 +107,7 @@ def _exchanged(motion: Motion, frames: NDArray[np.bool_], body: Body, sizes: Bon
     """A motion in which the joints of some frames (T,) are those of the other side, in poses that reach them."""
     joints, poses = motion.joints.copy(), motion.poses.copy()
     joints[frames] = joints[frames][:, other_side(motion.joint_names)]
-    fitted = fit_poses(JointTable(motion.times[frames], motion.joint_names, joints[frames]), body.name, sizes)
+    fitted = fit_poses(JointTable(motion.times[frames], motion.joint_names, joints[frames]), body.name, sizes, any_bend=True)
     poses[frames] = fitted.poses
     joints[frames] = body.points(fitted.poses)
     joint_sd, pose_sd = motion.joint_sd.copy(), motion.pose_sd.copy()

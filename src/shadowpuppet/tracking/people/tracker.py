@@ -33,8 +33,6 @@ TOUCHING = 0.25
 """Distance of two people's bodies below which they are estimated twice in a frame: the second time on evidence divided by the first."""
 SIDED = 0.01
 """Least difference in overlap between a body and the same turned round that tells the front from the back."""
-TURN_LOSS = 0.05
-"""Overlap by which a body turned round may fit worse if the person walks that way: among others front and back differ by 0.02."""
 ROUND_FIGURE = 0.6
 """Distance (m) from a figure up to which surface points are searched for its person."""
 
@@ -109,11 +107,18 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
     return Begun(_judged(best), bool(abs(found.overlap - other.overlap) >= SIDED))
 
 
-def turn_round(person: MultiviewTracker, rng: np.random.Generator, share: Share) -> MultiviewState | None:
-    """The person of a share facing the other way, fitted to the same evidence; None if that fits clearly worse."""
-    other = _facing_the_other_way(person, rng, share.state, PersonObservation(person.views, share.points, share.masks))
-    worse = np.nan_to_num(share.state.overlap) - np.nan_to_num(other.overlap)
-    return _judged(other) if worse <= TURN_LOSS else None
+def turn_round(person: MultiviewTracker, rng: np.random.Generator, share: Share) -> MultiviewState:
+    """The person of a share facing the other way, fitted to the same evidence."""
+    return _judged(_facing_the_other_way(person, rng, share.state, _observation(person, share)))
+
+
+def follow_turned(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState, share: Share) -> MultiviewState:
+    """The state after one of the body turned round, from the evidence of a share."""
+    return _judged(person.cycle(rng, state, _observation(person, share)))
+
+
+def _observation(person: MultiviewTracker, share: Share) -> PersonObservation:
+    return PersonObservation(person.views, share.points, share.masks)
 
 
 def _facing_the_other_way(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState,

@@ -18,6 +18,10 @@ ALONG = 0.7
 backwards."""
 
 
+TURN_SECONDS, TURN = 0.7, np.radians(110)
+"""Time and angle (rad) of a turn that is quicker than people turn: a body may be taken for one that faces the other way."""
+
+
 class Step(NamedTuple):
     """Where a person was and faced."""
 
@@ -51,6 +55,13 @@ class Walk:
     def forget(self) -> None:
         """Begin again, as after the body was turned round or lost."""
         self._steps.clear()
+
+    @property
+    def jerked(self) -> float | None:
+        """When (s) the body began to turn more quickly than people turn; None if it did not within `TURN_SECONDS`."""
+        now = self._steps[-1]
+        far = [step.time for step in self._steps if now.time - step.time <= TURN_SECONDS and step.facing @ now.facing < np.cos(TURN)]
+        return max(far, default=None)
 
     @property
     def forward(self) -> float:
