@@ -1,12 +1,14 @@
 """Would the tests notice a mistake? Small mistakes are put into the package at random, one at a time, and the tests of its room are run.
 
-    python benchmarks/mutants.py [--number 60] [--seed 1] [--under src/shadowpuppet/FOLDER] [--seconds 300]
+    python benchmarks/mutants.py [--number 60] [--seed 1] [--under src/shadowpuppet/FOLDER] [--seconds 300] [--near] [--again LIST]
 
 A mistake: a comparison, sum, product, whole number, condition, minimum or statement of a function is changed. Compiled functions are left
 out (plain twins check them), and so are texts, annotations and the constants of modules. Tests are those of the folder in tests/ that
-mirrors the module's, the files that name the module first, until one fails. Prints a line for each mistake, `killed` if a test fails,
-`hangs` if they take too long, else `SURVIVED`, and the share not survived. The mistakes are in a copy of the package in a temporary
-folder. A survivor is a test to write, or a change that changes nothing.
+mirrors the module's, the files that name the module first, until one fails. A test counts that passes without the mistake: one that fails
+then too (on a busy machine, by its clock) is left out, and the others go on. Prints a line for each mistake, `killed` and by which test,
+`hangs` if one test takes longer than `--seconds` with the mistake alone, else `SURVIVED`, and the share not survived. The mistakes are in a
+copy of the package in a temporary folder. A survivor is a test to write, or a change that changes nothing; `--again` tries the survivors in
+a printed list once more.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import argparse
 import ast
 import copy
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -24,6 +27,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pytest
 import smallest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -53,21 +57,33 @@ def main() -> int:
     parser.add_argument("--number", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--under", type=Path, default=PACKAGE, help="module, or folder of modules, to change")
-    parser.add_argument("--seconds", type=float, default=300, help="time after which tests count as hanging")
+    parser.add_argument("--seconds", type=float, default=300, help="time after which a test counts as hanging")
+    parser.add_argument("--again", type=Path, help="what an earlier run printed: its survivors instead of random ones")
+    parser.add_argument("--near", action="store_true", help="only the tests that name the module: a first look, in a tenth of the time")
     args = smallest.parse(parser, lambda folder: ["--number", 1, "--under", PACKAGE / "errors.py"])
     modules = [args.under.resolve()] if args.under.is_file() else sorted(args.under.resolve().rglob("*.py"))
     found = [mistake for module in modules if "scripts" not in module.parts for mistake in mistakes(module)]
-    chosen = np.random.default_rng(args.seed).permutation(len(found))[: args.number]
+    if args.again is None:
+        chosen = [found[k] for k in np.random.default_rng(args.seed).permutation(len(found))[: args.number]]
+    else:
+        survived = [line.removeprefix("SURVIVED ") for line in args.again.read_text("utf-8").splitlines() if line.startswith("SURVIVED ")]
+        chosen = [mistake for mistake in found if named(mistake) in survived]
     killed = 0
+    tests = near if args.near else tests_of
     with tempfile.TemporaryDirectory(prefix="shadowpuppet-mutants-") as folder:
         shutil.copytree(PACKAGE.parent, Path(folder) / "src", ignore=shutil.ignore_patterns("__pycache__"))
-        for mistake in (found[k] for k in chosen):
-            end = tried(mistake, Path(folder), args.seconds)
+        for mistake in chosen:
+            end, test = tried(mistake, tests(mistake.module), Path(folder), args.seconds)
             killed += end != "SURVIVED"
-            where = f"{mistake.module.relative_to(PACKAGE)}:{mistake.line}"
-            print(f"{end:8} {where}: {shown(mistake.before)} -> {shown(mistake.after)}", flush=True)
+            print(f"{end:8} {named(mistake)}" + (f"  by {test}" if test else ""), flush=True)
     print(f"{killed} of {len(chosen)} killed, {100 * killed / max(len(chosen), 1):.0f} %, of {len(found)} possible ones")
     return 0
+
+
+def named(mistake: Mistake) -> str:
+    """A mistake in a line."""
+    where = f"{mistake.module.relative_to(PACKAGE)}:{mistake.line}"
+    return f"{where}: {shown(mistake.before)} -> {shown(mistake.after)}"
 
 
 def shown(text: str) -> str:
@@ -75,21 +91,41 @@ def shown(text: str) -> str:
     return " ".join(text.split())[:70]
 
 
-def tried(mistake: Mistake, folder: Path, seconds: float) -> str:
-    """What the tests say of the package's copy in `folder` with a mistake in it: killed, hangs or SURVIVED."""
+def tried(mistake: Mistake, files: list[Path], folder: Path, seconds: float) -> tuple[str, str]:
+    """What the tests say of the package's copy in `folder` with a mistake in it: killed, hangs or SURVIVED, and which test noticed."""
     target = folder / "src" / mistake.module.relative_to(PACKAGE.parent)
-    whole = target.read_bytes()
-    target.write_text(mistake.text, encoding="utf-8")
+    whole, stamp, unfit = target.read_bytes(), target.stat(), list[str]()
+    while files:
+        target.write_text(mistake.text, encoding="utf-8")
+        try:
+            end, test = tested(folder, [*map(str, files), *(f"--deselect={each}" for each in unfit)], seconds)
+        finally:
+            target.write_bytes(whole)
+            os.utime(target, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))  # compiled kernels are kept by the module's time
+        if end == "SURVIVED" or not test or tested(folder, [test], seconds)[0] == "SURVIVED":
+            return end, test
+        unfit.append(test)
+    return "SURVIVED", ""
+
+
+def tested(folder: Path, arguments: list[str], seconds: float) -> tuple[str, str]:
+    """How pytest ends for the package in `folder`, and the test that failed; none where the tests cannot be begun."""
     environment = os.environ | {"PYTHONPATH": str(folder / "src"), "PYTHONDONTWRITEBYTECODE": "1",
                                 "NUMBA_CACHE_DIR": str(folder / "kernels")}  # fmt: skip
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *map(str, tests_of(mistake.module))]
-    try:
-        done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, timeout=seconds)
-        return "killed" if done.returncode else "SURVIVED"
-    except subprocess.TimeoutExpired:
-        return "hangs"
-    finally:
-        target.write_bytes(whole)
+    command = [sys.executable, "-m", "pytest", "-x", "-v", "--tb=no", "-p", "no:cacheprovider", "-o", f"faulthandler_timeout={seconds}",
+               "-o", "faulthandler_exit_on_timeout=true", *arguments]  # fmt: skip
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, errors="replace")
+    if done.returncode in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+        return "SURVIVED", ""
+    begun = re.findall(r"^(tests/.+?::.+?)(?: (PASSED|SKIPPED|XFAIL|FAILED|ERROR)\b.*)?$", done.stdout, re.MULTILINE)
+    test = next((test for test, outcome in reversed(begun) if outcome in ("FAILED", "ERROR", "")), "")
+    return "hangs" if "Timeout (" in done.stderr else "killed", test
+
+
+def near(module: Path) -> list[Path]:
+    """The files with tests that name a module."""
+    name, own = ".".join(module.relative_to(PACKAGE.parent).with_suffix("").parts), f"test_{module.stem}"
+    return [path for path in tests_of(module) if path.stem == own or name in path.read_text("utf-8")]
 
 
 def tests_of(module: Path) -> list[Path]:

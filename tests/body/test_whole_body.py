@@ -7,9 +7,10 @@ import pytest
 from people import random_poses
 from scipy import ndimage
 
-from shadowpuppet.body.anthropometry import ANATOMICAL_SHARES, CYLINDER_SHARES, SOLE
+from shadowpuppet.body.anthropometry import ANATOMICAL_SHARES, BONE_SHARES, CYLINDER_SHARES, SOLE, stature_of
 from shadowpuppet.body.models import MODELS, WHOLE, average_sizes, kind_of, make_body, sizes_kind
 from shadowpuppet.body.shapes import Body, Hulls, Limbs
+from shadowpuppet.body.sizes import HEIGHTS, expected_metres, is_within
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.rasterize import Picture
@@ -242,3 +243,21 @@ def test_what_is_drawn_is_what_the_limbs_are(name, view, rng):
     missing = filled & ~ndimage.binary_dilation(mask, iterations=2)  # the outline is a polygon of ten corners: round ends lose some
     assert missing.sum() < 0.01 * mask.sum()
     assert not Picture(body, camera, camera.T_camera_world).leg_bits(pose).any()
+
+
+def test_the_likeliest_stature_is_between_those_of_the_bones_nearer_to_the_surer():
+    assert stature_of({name: 1.7 * share for name, (share, _) in BONE_SHARES.items()}) == pytest.approx(1.7)
+    thigh, ankle = BONE_SHARES["thigh_length"], BONE_SHARES["ankle_height"]
+    lengths = {"thigh_length": 1.6 * thigh[0], "ankle_height": 1.8 * ankle[0], "trunk_width": 9.0}  # of the last nothing is known
+    grid = np.linspace(1.5, 2.0, 5001)
+    unlikely = sum(((grid * share - lengths[name]) / deviation) ** 2
+                   for name, (share, deviation) in (("thigh_length", thigh), ("ankle_height", ankle)))
+    assert stature_of(lengths) == pytest.approx(grid[unlikely.argmin()], abs=1e-4)
+
+
+@pytest.mark.parametrize(("height", "fits", "hint"), [
+    (1.75, True, ""), (0.5, True, ""), (2.5, True, ""), (2.51, False, ""), (0.4, False, ""), (175, False, " (175 cm are 1.75)"),
+    (True, False, ""), ("1.75", False, "")])  # fmt: skip
+def test_heights_are_metres_and_centimetres_get_a_hint(height, fits, hint):
+    assert is_within(height, HEIGHTS) == fits
+    assert expected_metres(height, HEIGHTS) == f"expected 0.5 to 2.5 metres{hint}"

@@ -77,3 +77,9 @@ def test_the_sign_is_that_of_a_later_second_sound(rng, lag):
     n = round(lag * RATE)
     second = np.concatenate([np.zeros(max(n, 0)), room[max(-n, 0) :]])
     assert best_shift(onset_strengths(room), onset_strengths(second)) == pytest.approx(lag, abs=0.002)
+
+
+def test_in_few_shifts_the_best_of_noise_is_not_taken_for_an_offset():
+    rng = np.random.default_rng(3)
+    for _ in range(12):  # 0.3 s more than they must have in common: no other shift is far enough off to compare with
+        assert best_shift(*(onset_strengths(rng.standard_normal(round(2.3 * RATE))) for _ in range(2))) is None

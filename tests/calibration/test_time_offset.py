@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from shadowpuppet.calibration.time_offset import QUANTILE, _compared, _Pair, _solved
+from shadowpuppet.calibration.time_offset import QUANTILE, _compared, _half_width, _Pair, _solved
 
 LATE = (0.0, 4.0, -2.0, 1.0)
 
@@ -30,7 +30,7 @@ def signals(rng, late: int, sets: int = 90) -> np.ndarray:
 def test_offsets_of_pairs_that_fit():
     late, known = _solved(4, pairs())
     assert known.all()
-    np.testing.assert_allclose(late - late[0], LATE, atol=1e-3)
+    np.testing.assert_allclose(late, LATE, atol=1e-3)  # whose lower median is zero
 
 
 @pytest.mark.parametrize("bad", ["p01", "p13", "p23"])
@@ -79,3 +79,15 @@ def test_sway_of_less_than_the_grid_of_pixels_gives_no_offset():
     for _ in range(6):  # the same sway in both, which whole pixels round each in its own way
         sway = wandering(rng, 240, 1.0, 10.0)
         assert _compared(0, 1, np.round(np.stack([sway + 0.2, sway - 0.3])), 120) is None
+
+
+def test_quick_movements_that_are_not_the_same_give_no_offset():
+    rng = np.random.default_rng(1)
+    for _ in range(12):  # by chance some shift is alike enough, but most of the difference is left at it
+        assert _compared(0, 1, np.stack([wandering(rng, 240, 30.0, 1.0), wandering(rng, 240, 30.0, 1.0)]), 120) is None
+
+
+def test_a_width_falls_with_pairs_that_agree_and_grows_with_those_that_do_not():
+    assert _half_width([0.0], [4.0]) == pytest.approx(QUANTILE * 2)
+    assert _half_width([0.0] * 2, [4.0] * 2) == _half_width([0.0] * 3, [4.0] * 3) == pytest.approx(QUANTILE * np.sqrt(2))
+    assert _half_width([2.0] * 4, [0.0] * 4) == pytest.approx(QUANTILE * 1.4826)

@@ -177,6 +177,7 @@ MIRROR = np.diag([-1.0, 1, 1, 1])
     ({"distortion": [0.1, math.inf, 0, 0]}, "distortions"),
     ({"T_camera_world": np.eye(3)}, "rotation and translation"),
     ({"T_camera_world": np.full((4, 4), np.nan)}, "rotation and translation"),
+    ({"T_camera_world": np.diag([1e200, 1, 1, 1])}, "rotation: found"),
     ({"T_camera_world": R_TILTED}, "rotation: found [[1.0, 0.01, 0.0]"),
     ({"T_camera_world": MIRROR}, "right-handed"),
 ])

@@ -170,6 +170,15 @@ def test_compiling_is_said_while_it_lasts(capsys, monkeypatch):
     assert lines[-1] == "... measuring the person, 0 s, compiling, once (a minute or two)"
 
 
+def test_what_a_message_quotes_is_printed_as_it_is(capsys):
+    with terminal_module.terminal() as listener:
+        listener.note("reading [red]films[/red] of [bold]")
+        listener.warn("camera '[dim]' is late")
+        listener.trouble("no pictures from [/dev/video0]")
+    lines = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("...")]
+    assert lines == ["reading [red]films[/red] of [bold]", "warning: camera '[dim]' is late", "warning: no pictures from [/dev/video0]"]
+
+
 def test_quiet_is_quiet(shell, recording):
     assert shell("track", recording, "-o", "run", "--quiet", *QUICK) == (0, "", "")
 

@@ -116,3 +116,12 @@ def test_an_old_python_breaks_the_core(monkeypatch):
     monkeypatch.setattr(doctor, "OLDEST_PYTHON", (9, 0))
     (found,) = doctor._python()
     assert (found.state, found.remedy) == ("broken", "install Python 9.0 or later")
+
+
+@pytest.mark.parametrize(("system", "found", "state"), [("Darwin", None, "works"), ("Linux", None, "missing"),
+                                                         ("Linux", "/usr/bin/chromium", "works")])
+def test_a_browser_is_missed_only_where_the_system_has_none_of_its_own(monkeypatch, system, found, state):
+    monkeypatch.setattr("shutil.which", lambda name: found)
+    monkeypatch.setattr("platform.system", lambda: system)
+    (said,) = doctor._browser()
+    assert said.state == state

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -18,9 +19,9 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import app as cli
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.evaluation import Comparison, measure_run
-from shadowpuppet.evaluation.report.charts import by_joint_and_time
+from shadowpuppet.evaluation.report.charts import POINTS, _binned, by_joint_and_time, fit_over_time
 from shadowpuppet.evaluation.report.page import page, write_report
-from shadowpuppet.evaluation.report.pictures import draw_bones, pictures, report_frames
+from shadowpuppet.evaluation.report.pictures import _side_by_side, draw_bones, pictures, report_frames
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.motion.table import write_joints
@@ -234,6 +235,20 @@ def grey_share(svg: str) -> float:
     return float((np.abs(image.astype(int) - [0x78, 0x70, 0x6B]).max(2) < 6).mean())
 
 
+def test_overlaps_are_drawn_up_to_one(tmp_path):
+    numbers = re.findall(r">(\d\.\d+)<", fit_over_time(measure_run(run_that_errs(tmp_path))))
+    assert max(map(float, numbers[: numbers.index("0.0")])) == 1.0  # from 0.0 on those of cost and time
+
+
+def test_a_curve_of_many_frames_is_drawn_as_means_of_neighbours():
+    times = np.arange(3.0 * POINTS)
+    gaps = np.where(np.arange(len(times)) % 3 == 1, np.nan, times)
+    gaps[:3] = np.nan
+    middle, known = _binned(times, [gaps])
+    np.testing.assert_allclose(middle, 3 * np.arange(POINTS) + 1)
+    np.testing.assert_allclose(known, [np.nan, *middle[1:]])
+
+
 def test_frames_of_a_camera_s_overlay_are_shown_side_by_side_with_the_truth(tmp_path, quick):
     run = run_that_errs(tmp_path)
     write_calibration(run / "calibration.toml", [camera()])
@@ -272,6 +287,18 @@ def test_of_several_cameras_overlay_the_person_is_cut_out(tmp_path):
         assert abs(white[:, 1].mean() / tile.shape[1] - 0.5) < 0.2
 
 
+@pytest.mark.parametrize("side", [-1, 1])
+def test_the_five_cameras_that_see_the_person_largest_are_shown(side):
+    """Of two the picture is smaller, wherever in it the person is."""
+    cameras, far = [], (1, 4)
+    for n in range(7):
+        focal, aside = (70, -side * 50) if n in far else (140, side * 50)
+        cameras.append(replace(camera(f"cam{n}"), matrix=[[focal, 0, 79.5 + aside], [0, focal, 59.5], [0, 0, 1]]))
+    image = _side_by_side([np.full((SIZE[1], SIZE[0], 3), 20 + 30 * n, np.uint8) for n in range(7)], cameras,
+                          [JointTable(TRUTH.times[:1], TRUTH.names, TRUTH.positions[:1])])
+    assert [np.median(tile) for tile in np.array_split(image, 5, axis=1)] == [20 + 30 * n for n in range(7) if n not in far]
+
+
 def test_frames_of_several_cameras_are_drawn_from_the_recording(tmp_path):
     cameras = [camera("one"), camera("two", 1.2)]
     (tmp_path / "lab" / "video").mkdir(parents=True)
@@ -284,6 +311,7 @@ def test_frames_of_several_cameras_are_drawn_from_the_recording(tmp_path):
     of = measure_run(run)
     shots, source = pictures(of, report_frames(of))
     assert (len(shots), source) == (8, "the recording")
+    assert '<div class="shots wide">' in page(of)
     for each in report_frames(of):
         image = cv2.imdecode(np.frombuffer(shots[each.letter], np.uint8), cv2.IMREAD_COLOR)
         assert np.median(image) == pytest.approx(40 + 2 * each.frame, abs=5)

@@ -341,6 +341,23 @@ def test_keys_of_the_page_are_commands(page):
         browser.close()
 
 
+def test_a_picture_is_drawn_once_for_all_pages_that_ask_at_once(page, monkeypatch):
+    drawings, got, view = [], [], tracked()
+
+    def slow(shown: View) -> np.ndarray | None:
+        drawings.append(shown)
+        time.sleep(0.2)
+        return drawn(shown)
+
+    monkeypatch.setattr(web, "drawn", slow)
+    asking = [threading.Thread(target=lambda: got.append(page.picture(7, view))) for _ in range(4)]
+    for each in asking:
+        each.start()
+    for each in asking:
+        each.join()
+    assert (len(drawings), len(got), len(set(got))) == (1, 4, 1)
+
+
 def test_a_browser_shows_the_page(page, tmp_path):
     """Chromium without a screen: the chip's and the skeleton's colours are in what it shows, and no script failed."""
     browser = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)

@@ -81,6 +81,12 @@ def test_an_arm_before_a_cable_gets_no_hole():
     assert not clutter.removed(drawn([person(20)], cable)[0])[:, 70:80].any()
 
 
+@pytest.mark.parametrize(("times", "width"), [(1, 7), (2, 9)])
+def test_gaps_that_are_closed_are_wider_than_the_thickest_line_and_its_margins(times, width):
+    masks = [np.kron(mask, np.ones((times, times), bool)) for mask in drawn(walking(), cable)]
+    assert find_clutter(masks).width == width  # lines under 3 and under 4 pixels
+
+
 def test_the_mask_itself_is_not_changed():
     masks = drawn(walking(), cable)
     before = masks[0].copy()

@@ -11,7 +11,7 @@ from silhouette_scenes import SIZE, empty_shots, overlap, scene, shot
 
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.silhouette.classifiers import ChannelClassifier
-from shadowpuppet.silhouette.shadows import INWARD_STEP, MAX_SHADE, MAYBE_SHADOW, OUTWARD_STEP, _part_sums, resolve_shadows
+from shadowpuppet.silhouette.shadows import INWARD_STEP, MAX_SHADE, MAYBE_SHADOW, OUTWARD_STEP, _part_sums, _thin_limbs, resolve_shadows
 
 SKIN_WALL = (90, 110, 150)
 """A wall of the hue of skin; blue green red."""
@@ -207,3 +207,12 @@ def test_a_broad_shadow_beside_the_person_is_no_limb_in_a_smeared_film_either(li
     planes[shadow] = (round(150 * light), 128, 128)
     label = np.where(trunk, 2, np.where(shadow, MAYBE_SHADOW, 0)).astype(np.uint8)
     assert not resolve_shadows(label, planes, mean, np.full_like(mean, 0.4), smeared=True)[shadow].any()
+
+
+def test_the_outline_of_a_thin_limb_is_as_sharp_as_its_own_darkness_allows():
+    """Sums of a part of 40 pixels that is 0.4 as bright as the scene and touches others with a fifth of its edge; one pixel of it is open,
+    where brightness falls by `across`: sharp is half of the 0.6 that it is darker."""
+    for across, limb in ((0.33, 1), (0.27, 0)):
+        sums = np.zeros((1, 12))
+        sums[0, :2], sums[0, -5:] = (40, 2), (10, 2, 1, across, 16)
+        assert _thin_limbs(sums) == [limb]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import fftconvolve
 
 SPEED_OF_SOUND = 343.0
 
@@ -33,13 +34,13 @@ def heard(rng: np.random.Generator, sound: np.ndarray, rate: int, late: float, *
         at = rng.uniform(0.003, 0.35)
         echoes[round(at * rate)] += 0.3 * rng.standard_normal() * np.exp(-at / 0.12)
     n = round((late + way / SPEED_OF_SOUND) * rate)
-    room = np.convolve(sound, echoes)[: len(sound)]
+    room = fftconvolve(sound, echoes)[: len(sound)]
     moved = np.concatenate([np.zeros(max(n, 0)), room[max(-n, 0) :]])
     return (loudness * (moved + noise * rng.standard_normal(len(moved)))).clip(-1, 1)
 
 
-def add_sound(film: Path, samples: np.ndarray, rate: int, codec: str = "aac") -> None:
-    """Put a sound (N,) beside a film's pictures, which are copied."""
+def add_sound(film: Path, samples: np.ndarray, rate: int, codec: str = "aac", late: float = 0.0) -> None:
+    """Put a sound (N,) beside a film's pictures, which are copied; it begins `late` seconds after them (negative: before)."""
     import av
 
     out = film.with_stem(f"{film.stem}-with-sound")
@@ -50,11 +51,13 @@ def add_sound(film: Path, samples: np.ndarray, rate: int, codec: str = "aac") ->
         for packet in source.demux(pictures):
             if packet.dts is not None:
                 packet.stream = copied
+                for name in ("pts", "dts"):
+                    setattr(packet, name, getattr(packet, name) + round(max(-late, 0) / packet.time_base))
                 target.mux(packet)
         block = sound.codec_context.frame_size or 1024
         for n in range(0, len(samples) - block, block):
             frame = av.AudioFrame.from_ndarray(samples[None, n : n + block].astype(np.float32), "fltp", "mono")
-            frame.sample_rate, frame.pts = rate, n
+            frame.sample_rate, frame.pts = rate, n + round(max(late, 0) * rate)
             target.mux(sound.encode(frame))
         target.mux(sound.encode(None))
     out.replace(film)

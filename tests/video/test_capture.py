@@ -300,6 +300,22 @@ def test_a_film_that_is_over_is_over():
     assert (shot.number, capture.newest.dropped, capture.error) == (2, 2, None)
 
 
+def test_who_waits_for_a_picture_of_a_film_that_ends_waits_no_longer():
+    end = threading.Event()
+
+    def read():
+        end.wait(20.0)
+        yield from ()
+
+    with Capture(Feed("film", (16, 12), math.nan, False, read)) as capture:
+        waiting = threading.Thread(target=capture.newest.take, args=(90.0,), daemon=True)
+        waiting.start()
+        until(lambda: capture.newest._changed._waiters)
+        end.set()
+        waiting.join(20.0)
+        assert not waiting.is_alive()
+
+
 def test_a_film_that_breaks_ends_with_its_error():
     with Capture(Unsteady("a hole").feed(live=False)) as capture:
         until(lambda: capture.ended)

@@ -32,6 +32,15 @@ def test_a_click_is_where_it_was(film, codec):
     assert len(found.samples) / 8000 == pytest.approx(2.0, abs=0.2)
 
 
+@pytest.mark.parametrize("late", [-0.4, 0.0, 0.6])
+def test_a_sound_s_begin_is_counted_from_the_first_picture(film, late):
+    samples = np.zeros(3 * RATE)
+    samples[RATE : RATE + 40] = 0.8
+    noises.add_sound(film, samples, RATE, late=late)
+    found = read_sound(film, 8000, 10.0)
+    assert found.begin + np.argmax(np.abs(found.samples)) / 8000 == pytest.approx(1.0 + late, abs=0.004)
+
+
 def test_only_the_beginning_is_read(film):
     noises.add_sound(film, 0.1 * np.random.default_rng(1).standard_normal(2 * RATE), RATE)
     assert len(read_sound(film, 8000, 0.5).samples) == 4000

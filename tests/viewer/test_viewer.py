@@ -8,6 +8,7 @@ import json
 import socket
 import subprocess
 import sys
+import threading
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -181,6 +182,26 @@ def test_whatever_is_asked_a_timeline_has_a_frame(acts):
             getattr(line, act)()
         assert 0 <= line.tick() < 4
         assert line.time == line.times[line.frame]
+
+
+def test_what_is_asked_while_the_timeline_advances_is_not_lost():
+    asked: list[threading.Thread] = []
+
+    def clock() -> float:
+        """At the third look, within `tick`, another thread pauses, as a page's button does."""
+        looks.append(0)
+        if len(looks) == 3:
+            asked.append(threading.Thread(target=line.pause))
+            asked[0].start()
+            asked[0].join(0.3)
+        return 50.0 * (len(looks) > 1)
+
+    looks: list[int] = []
+    line = Timeline(np.arange(10) / 10, clock)
+    line.play()
+    line.tick()  # past the end: the loop begins anew
+    asked[0].join()
+    assert not line.playing
 
 
 def test_one_frame_does_not_play():
@@ -701,7 +722,6 @@ def test_a_library_that_cannot_be_guarded_is_not_used(monkeypatch):
 
 def test_servers_that_begin_at_once_are_guarded_one_after_another(monkeypatch):
     pytest.importorskip("viser")
-    import threading
     import time
 
     import viser

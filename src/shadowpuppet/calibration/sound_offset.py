@@ -30,9 +30,9 @@ LOUDEST = 25.0
 would count as much as the clap."""
 MIN_OVERLAP = 2.0
 """Least time, seconds, that two films have in common."""
-LEAST_SCORE, LEAST_RATIO, RIVAL = 9.0, 1.6, 0.1
-"""The best shift's likeness must exceed the median of all by this number of robust standard deviations, and by this ratio that of the
-best shift farther away than `RIVAL` seconds: steps and music repeat themselves."""
+LEAST_RATIO, RIVAL = 1.6, 0.1
+"""The best shift's likeness, over the median of all, must be this ratio of that of the best shift farther away than `RIVAL` seconds: steps
+and music repeat themselves, and what is not shared has several shifts that are alike."""
 SPEED_OF_SOUND = 343.0
 QUANTILE = 1.645
 """Half-width of a 90 % interval over the standard deviation."""
@@ -103,11 +103,10 @@ def best_shift(first: Array, second: Array) -> float | None:
     order = np.argsort(lags)
     lags, likeness = lags[order], likeness[order]
     middle = float(np.median(likeness))
-    deviation = 1.4826 * float(np.median(np.abs(likeness - middle)))
     best = int(np.argmax(likeness))
     rivals = likeness[np.abs(lags - lags[best]) * HOP > RIVAL * RATE]
     height = likeness[best] - middle
-    if deviation <= 0 or height < LEAST_SCORE * deviation or (len(rivals) and height < LEAST_RATIO * (rivals.max() - middle)):
+    if height <= 0 or height < LEAST_RATIO * (rivals.max() - middle):
         return None
     return float(lags[best] + _summit(likeness, best)) * HOP / RATE
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -26,13 +25,12 @@ MAX_DECODED = 1.0
 class Seeker:
     """Frames of a film, picture or folder by time: `at(time)` is the nearest frame, or None if none is within 1.5 frame intervals.
 
-    Times are those of `open_frames` if they increase; else frames are counted from the start after each step back. Thread-safe.
+    Times are those of `open_frames` if they increase; else frames are counted from the start after each step back.
     """
 
     def __init__(self, source: Path, size: Size, rate: float | None = None) -> None:
         """`size`: of the frames; `rate`: frames/s, in place of the film's times. Raises `VideoError` if nothing can be read."""
         self.source, self.size, self.rate = source, size, rate
-        self._lock, self._stack = threading.Lock(), contextlib.ExitStack()
         if source.is_dir():
             self._roll: _Folder | _Film | _Still = _Folder(source, rate)
         elif source.suffix.lower() in IMAGE_SUFFIXES:
@@ -50,15 +48,13 @@ class Seeker:
 
     def close(self) -> None:
         """Close the film."""
-        with self._lock:
-            self._roll.close()
+        self._roll.close()
 
     def at(self, time: float) -> Image | None:
         """The frame (H, W, 3), blue green red, at a time, seconds after the first; None if there is none."""
         import cv2
 
-        with self._lock:
-            image = self._roll.at(time)
+        image = self._roll.at(time)
         if image is None or image.shape[1::-1] == self.size:
             return image
         how = cv2.INTER_AREA if self.size[0] <= image.shape[1] else cv2.INTER_LINEAR

@@ -42,7 +42,9 @@ def read(tmp_path, text: str):
 
 
 def test_a_small_file_by_hand(tmp_path):
-    table = read(tmp_path, TEXT).joints()
+    found = read(tmp_path, TEXT)
+    assert [node.parent for node in found.nodes] == [-1, 0, 1]
+    table = found.joints()
     assert table.names == ("Hips", "Knee", "Knee_end")
     np.testing.assert_allclose(table.times, [0, 0.05])
     np.testing.assert_allclose(table.positions[0], [[10, 21, 30], [10, 19, 30], [10, 16, 30]])

@@ -160,7 +160,8 @@ def test_who_does_not_move_is_reported(rng):
     still = JointTable(np.arange(40) / 60, table.names, places + 2e-4 * rng.standard_normal(places.shape))
     with pytest.warns(ShadowPuppetWarning, match="clip 0: nobody moves there") as warned:
         train(still)
-    assert {warning.filename for warning in warned} == {__file__}  # the caller's line, not ours
+    line = train.__code__.co_firstlineno + 1
+    assert {(warning.filename, warning.lineno) for warning in warned} == {(__file__, line)}  # the caller's line, not ours
 
 
 @settings(max_examples=30, deadline=None)

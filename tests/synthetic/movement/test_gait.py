@@ -86,6 +86,15 @@ def test_the_motions_on_which_settings_were_chosen_stay_as_they_are(n, frame, jo
     np.testing.assert_allclose(at(found, joint)[frame], wanted, atol=2e-9)
 
 
+@pytest.mark.parametrize(("name", "wanted"), [
+    ("box", -135.122589), ("jog", -92.459863), ("jump", -85.543916), ("kneel", -34.084659), ("lift", -80.496554),
+    ("march", -118.350827), ("random_body", -113.350090), ("sit", -119.987044), ("sit_down", -121.609135),
+    ("squat", -93.096875), ("turn_around", -102.284140), ("walk", -227.746995)])  # fmt: skip
+def test_the_actions_before_which_settings_were_chosen_stay_as_they_are(name, wanted):
+    joints = go(name)[1].joints
+    assert (joints * np.random.default_rng(1).standard_normal(joints.shape)).sum() == pytest.approx(wanted, abs=1e-5)
+
+
 @pytest.mark.parametrize(("seed", "kind", "stature", "girth"), [
     (1, "man", 1.7798453, 1.0264350), (9, "child", 1.2516879, 0.7807431), (13, "woman", 1.7459124, 1.0766451)])  # fmt: skip
 def test_the_people_on_whom_settings_were_chosen_stay_as_they_are(seed, kind, stature, girth):
@@ -158,6 +167,16 @@ def test_a_walking_person_bends_hip_and_knee_as_published():
     assert 10 < by_phase(knee, own, np.linspace(0.1, 0.2, 5)).max() < 22
     assert 58 < by_phase(knee, own, np.linspace(0.65, 0.8, 9)).max() < 68
     assert by_phase(knee, own, [0.4])[0] < 14
+
+
+@pytest.mark.parametrize(("jogging", "most"), [(False, (0.01, 0.03)), (True, (0.005, 0.02))])
+def test_the_pelvis_sways_over_the_foot_that_stands(jogging, most):
+    walk, found, phase = steady(jogging)
+    side = at(found, "pelvis")[:, 0]
+    stands = walk.cycle.middle + 0.08  # of the left leg, in the middle of its stance; to the left lies +X
+    left, right = by_phase(side, phase, [stands, stands + 0.5]) - side.mean()
+    assert most[0] < left < most[1]
+    assert most[0] < -right < most[1]
 
 
 def test_a_jogging_person_flies_and_a_walking_one_does_not():

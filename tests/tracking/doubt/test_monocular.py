@@ -181,3 +181,23 @@ def test_the_mirror_image_of_a_bone_is_as_far_before_as_it_is_behind():
     assert found[0] == found[3] == 0
     assert found[1] == pytest.approx(2 * 0.2, abs=0.03)
     assert found[2] >= found[1]
+
+
+def test_the_spread_is_that_of_the_particles_where_they_are_equally_good():
+    """Half of an arm's particles are where the estimate is, half 0.4 rad off; costs of the others are too high to count."""
+    body, at = people.picture().body, pose()
+    k = body.skeleton.dof_names.index("left_shoulder_abduction")
+    off = at.copy()
+    off[k] += 0.4
+    begun, particles = state(at), []
+    for stage, each in zip(tracker().stages, begun.particles):
+        poses, costs = np.repeat(at[None, stage.dofs], 300, axis=0), np.zeros(300)
+        if k in stage.dofs:
+            poses[:100] = off[stage.dofs]
+            poses[200:], costs[200:] = 0.0, 1e6
+        particles.append(each._replace(poses=poses, costs=costs))
+    points = people.picture().points(at[None])[0]
+    moved = people.picture().points(off[None])[0] - points
+    found = MonocularDoubt(tracker())._spread(begun._replace(particles=tuple(particles)), points)
+    assert abs(moved[LEFT_HAND]).max() > 0.1
+    np.testing.assert_allclose(found, abs(moved) * np.sqrt(0.5), atol=2e-3)

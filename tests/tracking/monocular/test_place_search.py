@@ -55,10 +55,12 @@ def test_the_place_of_most_moments_counts():
 
 def test_who_is_turned_away_is_found_where_they_are():
     picture = PersonEstimate(SIZES, 1.75, 2.2, -0.35).picture(CAMERA)
-    pose = BODIES["rounded"](SIZES).skeleton.pose(torso_twist=1.2, left_shoulder_abduction=0.2, left_shoulder_forward=1.2,
+    pose = BODIES["rounded"](SIZES).skeleton.pose(torso_twist=1.5, left_shoulder_abduction=0.2, left_shoulder_forward=1.2,
                                                   right_shoulder_forward=1.2, left_elbow_flexion=0.6, right_elbow_flexion=0.6)
     mask = picture.mask(pose) | picture.legs(pose, spread=np.radians(8))
-    assert find_place(CAMERA, [mask], None, None, SIZES)[0].distance == pytest.approx(2.2, rel=0.15)
+    found = find_place(CAMERA, [mask], None, None, SIZES)
+    assert found.estimate.distance == pytest.approx(2.2, rel=0.15)
+    assert found.overlap > 0.75  # of bodies that face the camera 0.69
 
 
 def test_given_distances_are_kept():

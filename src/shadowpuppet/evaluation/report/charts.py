@@ -257,7 +257,7 @@ def _binned(times: Array, series: Sequence[Array]) -> tuple[Array, ...]:
     """Times and series (T,) reduced to `POINTS` means of neighbours."""
     if len(times) <= POINTS:
         return (times, *series)
-    groups = np.minimum(np.arange(len(times)) * POINTS // len(times), POINTS - 1)
+    groups = np.arange(len(times)) * POINTS // len(times)
 
     def mean(values: Array) -> Array:
         known = np.isfinite(values)

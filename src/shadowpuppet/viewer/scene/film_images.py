@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import warnings
 from collections.abc import Sequence
 from functools import cached_property
@@ -28,7 +27,7 @@ class FilmImages:
     """Pictures and silhouettes of a film at any time of the recording (s), at the working size; keeps the last of each.
 
     Uses the recording's silhouettes if it has them and `options.masks` is set; else segments the film as `track` does, and learns the
-    background at the first request.
+    background at the first request. For one thread at a time.
     """
 
     def __init__(self, footage: Footage, options: Options) -> None:
@@ -38,23 +37,21 @@ class FilmImages:
         assert not isinstance(view.video, (int, str))
         self._film = Seeker(view.video, footage.camera.size, rate)
         self._ready = Seeker(view.masks, footage.camera.size, rate) if view.masks is not None and options.masks else None
-        self._lock, self.trouble = threading.RLock(), ""
+        self.trouble = ""
         self._pictured: tuple[float, Image | None] = (np.nan, None)
         self._masked: tuple[float, Mask | None] = (np.nan, None)
 
     def picture(self, time: float) -> Image | None:
         """Picture (H, W, 3), BGR."""
-        with self._lock:
-            if self._pictured[0] != time:
-                self._pictured = time, self._film.at(time + self.footage.view.start) if self._is_within(time) else None
-            return self._pictured[1]
+        if self._pictured[0] != time:
+            self._pictured = time, self._film.at(time + self.footage.view.start) if self._is_within(time) else None
+        return self._pictured[1]
 
     def mask(self, time: float) -> Mask | None:
         """Silhouette (H, W); None if there is no picture."""
-        with self._lock:
-            if self._masked[0] != time:
-                self._masked = time, None if self.trouble else self._tried(time)
-            return self._masked[1]
+        if self._masked[0] != time:
+            self._masked = time, None if self.trouble else self._tried(time)
+        return self._masked[1]
 
     def _tried(self, time: float) -> Mask | None:
         """Silhouette (H, W), or None if there is none. A failure is a warning and sets `trouble`: no more silhouettes are made."""

@@ -37,7 +37,7 @@ class Panel:
         """Adds the controls that the scene needs."""
         self.server, self.view, self.scene = server, view, view.scene
         self.timeline = Timeline(self.scene.times, clock)
-        self._changed, self._done, self._drawing = threading.Event(), False, threading.Lock()
+        self._changed, self._done = threading.Event(), False
         self._shown: int | None = None
         self._setting = False
         server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium", brand_color=(0, 92, 148))
@@ -59,20 +59,19 @@ class Panel:
             self._changed.wait(max(1 / MAX_RATE - (time.monotonic() - began), 0.001) if playing else 0.1)
             self._changed.clear()
 
-    def draw(self, again: bool = False) -> None:
-        """Draw the current frame if it is new, or `again`."""
-        with self._drawing:
-            frame = self.timeline.tick()
-            if frame == self._shown and not again and not self._stale:
-                return
-            self._shown, self._stale = frame, False
+    def draw(self) -> None:
+        """Draw the current frame if it is new or options changed."""
+        frame = self.timeline.tick()
+        if frame == self._shown and not self._stale:
+            return
+        self._shown, self._stale = frame, False
+        self._show_facts_of(frame)
+        if self.view.reads_first:
+            self.status.content += " · reading the films"
+        slow = self.view.reads_first
+        self.view.to(float(self.scene.times[frame]))
+        if slow:
             self._show_facts_of(frame)
-            if self.view.reads_first:
-                self.status.content += " · reading the films"
-            slow = self.view.reads_first
-            self.view.to(float(self.scene.times[frame]))
-            if slow:
-                self._show_facts_of(frame)
 
     def stop(self) -> None:
         """End `follow`."""
