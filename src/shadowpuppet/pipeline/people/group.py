@@ -164,7 +164,7 @@ class Group:
     def _try_both_ways(self, member: Member, share: Share, time: float) -> None:
         """Follow a person of unknown front as facing the other way too, until that is clearly better or worse."""
         tracker, trial = member.subject.tracker, member.trial
-        if member.facing.is_known:
+        if member.facing.is_known or not member.subject.is_measured:  # with average sizes both ways fit too alike
             member.trial = None
         elif trial is None or time - trial.begun > LONGEST_TRIAL:
             member.trial = Trial(time, turn_round(tracker, member.rng, share))
