@@ -53,6 +53,34 @@ def test_nothing_is_stated_where_no_sound_is_shared(make):
         assert offsets([make(rng, 12 * RATE) for _ in range(3)]).seconds == (None, None, None)
 
 
+def bangs(rng, *times: float) -> np.ndarray:
+    """Some bangs in a quiet room, (N,)."""
+    sound, t = np.zeros(12 * RATE), np.arange(RATE // 4) / RATE
+    for time in times:
+        sound[round(time * RATE) :][: len(t)] += np.exp(-t / 0.01) * rng.standard_normal(len(t))
+    return sound
+
+
+def test_a_bang_of_its_own_in_each_film_is_nothing_shared():
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        sounds = [noises.heard(rng, bangs(rng, rng.uniform(1, 10)), RATE, 0.0) for _ in range(2)]
+        assert offsets(sounds).seconds == (None, None)
+
+
+@pytest.mark.parametrize(("claps", "least"), [((3.1, 4.0, 6.5, 7.1), 8), ((3.1, 5.0), 5), ((3.1,), 0)])
+def test_of_some_claps_most_confirm_one_another_and_one_alone_says_nothing(claps, least):
+    stated = 0
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        room = bangs(rng, *claps)
+        first, second = offsets([noises.heard(rng, room, RATE, late) for late in (0.0, 0.6)]).seconds
+        assert first is None or second - first == pytest.approx(0.6, abs=0.01)
+        stated += first is not None
+    assert stated >= least
+    assert stated == 0 or len(claps) > 1
+
+
 def test_of_beats_that_repeat_themselves_none_is_chosen(rng):
     beat = np.tile(np.exp(-np.arange(RATE // 2) / 100) * rng.standard_normal(RATE // 2), 24)
     assert offsets([noises.heard(rng, beat, RATE, late) for late in (0.0, 0.2)]).seconds == (None, None)

@@ -33,6 +33,9 @@ MIN_OVERLAP = 2.0
 LEAST_RATIO, RIVAL = 1.6, 0.1
 """The best shift's likeness, over the median of all, must be this ratio of that of the best shift farther away than `RIVAL` seconds: steps
 and music repeat themselves, and what is not shared has several shifts that are alike."""
+MOMENT, CONFIRMED = 0.3, 5.0
+"""Half the length (s) of a moment, with its echoes; and robust standard deviations by which the likeness without the moment that counts
+most must still exceed the median of all shifts: 0 to 2 where nothing else is shared, 8 and more where something is."""
 SPEED_OF_SOUND = 343.0
 QUANTILE = 1.645
 """Half-width of a 90 % interval over the standard deviation."""
@@ -89,26 +92,44 @@ def onset_strengths(samples: Array | NDArray[np.float32]) -> Array:
 
 
 def best_shift(first: Array, second: Array) -> float | None:
-    """Seconds by which the onsets (B, F) come later in the second sound; None if no shift stands out."""
-    n, m = first.shape[1], second.shape[1]
-    size = next_fast_len(n + m)
-    likeness = np.fft.irfft((np.conj(np.fft.rfft(first, size)) * np.fft.rfft(second, size)).sum(0), size)
-    lags = np.concatenate([np.arange(m), np.arange(-n + 1, 0)])  # second[k + lag] beside first[k]
-    likeness = np.concatenate([likeness[:m], likeness[size - n + 1 :]])
-    common = np.minimum(n, m - lags) - np.maximum(0, -lags)
-    enough = common * HOP >= MIN_OVERLAP * RATE
-    if enough.sum() < 100:
+    """Seconds by which the onsets (B, F) come later in the second sound; None if no shift stands out, or one moment alone tells it: two
+    films of different bangs are as alike at the shift that lays one on the other as two films of the same."""
+    found = _likenesses(first, second)
+    if found is None:
         return None
-    lags, likeness = lags[enough], likeness[enough] / np.sqrt(common[enough])
-    order = np.argsort(lags)
-    lags, likeness = lags[order], likeness[order]
+    lags, likeness = found
     middle = float(np.median(likeness))
     best = int(np.argmax(likeness))
     rivals = likeness[np.abs(lags - lags[best]) * HOP > RIVAL * RATE]
     height = likeness[best] - middle
-    if height <= 0 or height < LEAST_RATIO * (rivals.max() - middle):
+    if height <= 0 or height < LEAST_RATIO * (rivals.max() - middle) or not _is_confirmed(first, second, int(lags[best])):
         return None
     return float(lags[best] + _summit(likeness, best)) * HOP / RATE
+
+
+def _likenesses(first: Array, second: Array) -> tuple[NDArray[np.int64], Array] | None:
+    """Shifts (L,) of onsets (B, F), in spectra, and how alike both are at each, per root of what they have in common; None if too few."""
+    n, m = first.shape[1], second.shape[1]
+    size = next_fast_len(n + m)
+    likeness = np.fft.irfft((np.conj(np.fft.rfft(first, size)) * np.fft.rfft(second, size)).sum(0), size)
+    lags = np.arange(-n + 1, m)  # second[k + lag] beside first[k]
+    common = np.minimum(n, m - lags) - np.maximum(0, -lags)
+    enough = common * HOP >= MIN_OVERLAP * RATE
+    return (lags[enough], likeness[lags[enough]] / np.sqrt(common[enough])) if enough.sum() >= 100 else None
+
+
+def _is_confirmed(first: Array, second: Array, lag: int) -> bool:
+    """Whether the onsets (B, F) are alike at a shift also without the moment that counts most there."""
+    begin, end = max(0, -lag), min(first.shape[1], second.shape[1] - lag)
+    shared = (first[:, begin:end] * second[:, begin + lag : end + lag]).sum(0)
+    moment, reach = begin + int(np.argmax(shared)), round(MOMENT * RATE / HOP)
+    rest = first.copy()
+    rest[:, max(moment - reach, 0) : moment + reach] = 0
+    found = _likenesses(rest, second)
+    assert found is not None
+    lags, likeness = found
+    at = likeness[np.abs(lags - lag) <= 2].max() - np.median(likeness)
+    return bool(at > CONFIRMED * 1.4826 * np.median(np.abs(likeness - np.median(likeness))))
 
 
 def _summit(values: Array, k: int) -> float:
