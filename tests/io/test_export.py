@@ -17,7 +17,7 @@ import pytest
 import runs
 
 from shadowpuppet.body.models import WHOLE
-from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.errors import FormatError, ShadowPuppetWarning
 from shadowpuppet.io.export import FORMATS, export_run
 from shadowpuppet.io.files.table import read_table
 from shadowpuppet.io.motion import EXPORTS
@@ -94,6 +94,15 @@ def test_a_floor_that_is_not_at_0_is_put_there(shell, tmp_path):
     np.testing.assert_allclose(read_motion_npz(tmp_path / "out" / "run.npz").joints[..., 2], before[..., 2] - level, atol=1e-6)
     roots = [np.array((tmp_path / folder / "run.bvh").read_text().splitlines()[-1].split()[:3], float) for folder in ("before", "out")]
     np.testing.assert_allclose(np.sort(np.abs(roots[1] - roots[0])), [0, 0, -level], atol=1e-4)
+
+
+@pytest.mark.parametrize("floor", ["floor = 1.0", "floor.height_m = 'low'", "floor.height_m = nan", "floor.height_m = true", "floor.height = 1.0"])
+def test_a_floor_that_is_no_height_is_refused(tmp_path, floor):
+    run = runs.make_run(tmp_path / "run", "rounded", frames=3)
+    text = (run / "run.toml").read_text()
+    (run / "run.toml").write_text(f"{floor}\n{text}")
+    with pytest.raises(FormatError, match=r"run.toml: floor: found .*, expected a table with height_m, metres"):
+        read_run(run)
 
 
 def test_by_default_files_lie_in_the_run_and_a_new_run_may_replace_it(shell, whole, tmp_path):

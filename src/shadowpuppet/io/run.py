@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError
+from shadowpuppet.errors import FormatError, shown
 from shadowpuppet.io.files.table import Table, read_table
 from shadowpuppet.io.files.text import errors_named, read_limited, read_toml
 from shadowpuppet.io.motion.npz import read_motion_npz
@@ -62,8 +62,7 @@ class Run:
     @property
     def floor(self) -> float:
         """Height of the floor in the world, metres: 0 unless run.toml says otherwise."""
-        found = self.info.get("floor", {})
-        return float(found.get("height_m", 0.0)) if isinstance(found, dict) else 0.0
+        return float(self.info.get("floor", {}).get("height_m", 0.0))
 
 
 def read_run(folder: str | Path) -> Run:
@@ -110,6 +109,10 @@ def _check_info(path: Path, info: dict[str, Any]) -> None:
     for key, (kind, expected) in kinds.items():
         if not isinstance(info.get(key), kind):
             raise FormatError(f"{path}: {key}: found {info.get(key)!r}, expected {expected}")
+    floor = info.get("floor", {"height_m": 0.0})
+    height = floor.get("height_m") if isinstance(floor, dict) else None
+    if isinstance(height, bool) or not isinstance(height, int | float) or not np.isfinite(height):
+        raise FormatError(f"{path}: floor: found {shown(floor)}, expected a table with height_m, metres")
 
 
 def _read_metrics(path: Path) -> dict[str, Any]:
