@@ -96,7 +96,8 @@ def test_a_floor_that_is_not_at_0_is_put_there(shell, tmp_path):
     np.testing.assert_allclose(np.sort(np.abs(roots[1] - roots[0])), [0, 0, -level], atol=1e-4)
 
 
-@pytest.mark.parametrize("floor", ["floor = 1.0", "floor.height_m = 'low'", "floor.height_m = nan", "floor.height_m = true", "floor.height = 1.0"])
+@pytest.mark.parametrize("floor", ["floor = 1.0", "floor.height_m = 'low'", "floor.height_m = nan", "floor.height_m = true",
+                                   "floor.height = 1.0"])  # fmt: skip
 def test_a_floor_that_is_no_height_is_refused(tmp_path, floor):
     run = runs.make_run(tmp_path / "run", "rounded", frames=3)
     text = (run / "run.toml").read_text()
