@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -125,3 +127,13 @@ def test_a_browser_is_missed_only_where_the_system_has_none_of_its_own(monkeypat
     monkeypatch.setattr("platform.system", lambda: system)
     (said,) = doctor._browser()
     assert said.state == state
+
+
+@pytest.mark.parametrize(("rights", "state"), [(os.R_OK | os.W_OK, "works"), (os.R_OK, "broken"), (os.W_OK, "broken"), (0, "broken")])
+def test_a_camera_must_be_readable_and_writable(monkeypatch, rights, state):
+    monkeypatch.setattr("platform.system", lambda: "Linux")
+    monkeypatch.setattr(Path, "glob", lambda self, pattern: [Path("/dev/video7")])
+    monkeypatch.setattr(os, "access", lambda path, wanted: (rights & wanted) == wanted)
+    (found,) = doctor._cameras()
+    assert found.state == state
+    assert "video7" in found.told

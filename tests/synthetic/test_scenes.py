@@ -19,10 +19,11 @@ from shadowpuppet.synthetic.compositing import FAR, Layer, composite, composite_
 from shadowpuppet.synthetic.furniture import SHAPES, Furniture
 from shadowpuppet.synthetic.movement import gestures
 from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import SEGMENTS, Figure, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.person.surface import Surface, ellipsoid
-from shadowpuppet.synthetic.person_renderer import PersonRenderer
+from shadowpuppet.synthetic.person_renderer import PersonRenderer, _covering
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.room import lamp_brightness
 from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
@@ -513,3 +514,15 @@ def test_obstacles_that_hide_nothing_are_reported(tmp_path):
     spec = with_scene(replace(SMALL, rate=1), obstacles=(Obstacle(kind="table", ahead=-2.0, left=2.0),))
     with pytest.warns(ShadowPuppetWarning, match="obstacles: nothing of the person is hidden"):
         synthesize(spec, tmp_path, np.random.default_rng(0))
+
+
+def test_the_spheres_by_which_parts_are_culled_cover_them(rng):
+    """What a sphere misses would be missing in the pictures."""
+    surface = dressed(Mannequin(), Clothes())
+    number = len(surface.length)
+    axes, origin = np.broadcast_to(np.eye(3), (number, 3, 3)), rng.standard_normal((number, 3))
+    spheres = _covering(origin, axes, surface)
+    along = np.linspace(-surface.caps[:, 0], surface.length + surface.caps[:, 1], 25)
+    rim = np.stack([surface.radius + 0 * along, 0 * along, along], -1)
+    far = np.linalg.norm((origin + rim)[:, :, None] - spheres[..., :3], axis=-1)
+    assert (far <= spheres[..., 3]).any(-1).all()
