@@ -7,8 +7,8 @@
 # each step makes of the particles. Where the package has the step as a function, the page calls it too and checks that both agree.
 #
 # The page is made from the script `papers/lectures/liu2011.py`, whose cells (`# %%`) open as a notebook in VS Code, Spyder, PyCharm and
-# Jupytext. To run it: `python -m papers.lectures liu2011` in the root of the repository, with the extra `report`; `--page` writes this
-# page anew.
+# Jupytext. To run it: `python -m papers.lectures liu2011` in the root of the repository, with the extra `report`; `--page` updates this
+# page.
 
 # %%
 import tempfile
@@ -236,7 +236,7 @@ print(f"cost of the pose: {cost(last.pose[None])[0]} pixels before, {cost(pose[N
 # ## Algorithm 2, and both schemes side by side
 #
 # That was one turn of Algorithm 2's loop. `MonocularTracker.cycle` is the same in one call. Repeated on the same picture, DRS gathers its
-# particles around the best; SRS keeps the best one too, but scatters all others anew each time, as if their costs were equal. Mean of ten
+# particles around the best; SRS keeps the best one too, but scatters all others again each time, as if their costs were equal. Mean of ten
 # repetitions:
 
 # %%

@@ -8,8 +8,8 @@
 # too and checks that both agree.
 #
 # The page is made from the script `papers/lectures/ni2008.py`, whose cells (`# %%`) open as a notebook in VS Code, Spyder, PyCharm and
-# Jupytext. To run it: `python -m papers.lectures ni2008` in the root of the repository, with the extra `report`; `--page` writes this
-# page anew.
+# Jupytext. To run it: `python -m papers.lectures ni2008` in the root of the repository, with the extra `report`; `--page` updates this
+# page.
 
 # %%
 from dataclasses import replace

@@ -67,7 +67,7 @@ class _What(TextColumn):
     """What is being done, and that code is being compiled for it."""
 
     def render(self, task: Task) -> Text:
-        """Drawn anew with each refresh."""
+        """The text at each refresh."""
         return Text(task.description + _compiling())
 
 

@@ -24,7 +24,7 @@ ENDINGS = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".cal", ".
 NO_CALIBRATIONS = ("recording.toml", "spec.toml", "person.toml", "run.toml", "Config.toml", "sessionMetadata.yaml")
 """Names of files with such endings that are no calibrations."""
 ONE_A_FILE = (".cal", ".calib", *SUFFIXES)
-"""Endings of files of which a folder may have one for each camera."""
+"""Endings of calibration files that may come one per camera."""
 HEAD_BYTES = 4096
 """Number of bytes from which a format is recognised."""
 

@@ -76,7 +76,7 @@ class MultiviewTracker:
     looks: int = 0
     """Number of frames after which parts of the silhouettes that the body does not explain are left out; 0: never."""
     carve: Callable[[Sequence[Mask | None]], SurfacePoints] | None = None
-    """Surface points of masks (H, W), one per camera: made anew without a camera that contradicts the others; None: all count."""
+    """Surface points of masks (H, W), one per camera: computed again without a camera that contradicts the others; None: all count."""
 
     def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
              also: Cost | None = None) -> MultiviewState:

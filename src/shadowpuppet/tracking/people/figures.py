@@ -19,7 +19,8 @@ from shadowpuppet.jit import kernel
 from shadowpuppet.tracking.people.floor import ASIDE, HEIGHTS, LEGS, TRUNK, Floor, figure_points, floor_under, pixel_index
 
 NEEDED = 0.65
-"""Least evidence for a person, in views: what is silhouette of the figure and explained by nobody else, less `EMPTY` times what is not."""
+"""Least evidence for a person, in views: the share of the figure that is silhouette and not another person's, less `EMPTY` times the share
+that is no silhouette."""
 EMPTY = 2.0
 """Weight of a part of a figure that is no silhouette, over one that is."""
 MIN_VIEWS = 2
@@ -32,7 +33,7 @@ WIDE, HEAD = 0.22, 0.11
 """Half the width of what a figure explains, at trunk and legs and at the head, metres."""
 ROWS = np.array([len(TRUNK), len(LEGS), len(ASIDE)])
 NONE, NEW, KNOWN = 0, 1, 2
-"""What a pixel is: no silhouette, silhouette that nobody explains, silhouette that may be another's."""
+"""What a pixel is: no silhouette, silhouette that no body explains, silhouette that may be another's."""
 
 
 TRIED_REACH, TRIED_NEAR = 0.3, 0.5
