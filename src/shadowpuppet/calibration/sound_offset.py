@@ -128,8 +128,8 @@ def _is_confirmed(first: Array, second: Array, lag: int) -> bool:
     found = _likenesses(rest, second)
     assert found is not None
     lags, likeness = found
-    at = likeness[np.abs(lags - lag) <= 2].max() - np.median(likeness)
-    return bool(at > CONFIRMED * 1.4826 * np.median(np.abs(likeness - np.median(likeness))))
+    above = likeness - np.median(likeness)
+    return bool(above[np.abs(lags - lag) <= 2].max() > CONFIRMED * 1.4826 * np.median(np.abs(above)))
 
 
 def _summit(values: Array, k: int) -> float:

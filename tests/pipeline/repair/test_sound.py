@@ -38,7 +38,7 @@ def films(folder, frames_of, late):
 
 @pytest.fixture(scope="module")
 def still(tmp_path_factory):
-    """A person who does not move, before films of which two are late."""
+    """Films of a person who does not move; two of them are late."""
     return films(tmp_path_factory.mktemp("sound") / "still", lambda n, k: 12, LATE)
 
 

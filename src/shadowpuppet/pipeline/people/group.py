@@ -153,11 +153,11 @@ class Group:
         if member.walk.forward > ALONG:
             member.facing.show(time, wrong=False)
         elif member.walk.forward < -ALONG:
-            member.walk.forget()
             turned = turn_round(member.subject.tracker, member.rng, member.share)
             if np.nan_to_num(member.state.overlap) - np.nan_to_num(turned.overlap) <= TURN_LOSS:
                 self._turn(member, time, turned)
             else:
+                member.walk.forget()
                 member.facing.is_known = False
         self._try_both_ways(member, member.share, time)
 

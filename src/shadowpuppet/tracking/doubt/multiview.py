@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Limbs
-from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, limb_of
@@ -155,9 +155,7 @@ class MultiviewDoubt:
     @cached_property
     def counterparts(self) -> NDArray[np.int64]:
         """Index of each joint's counterpart on the other side (L,); its own without one."""
-        other = {f"{a}_": f"{b}_" for a, b in (SIDES, SIDES[::-1])}
-        swapped = [next((b + name.removeprefix(a) for a, b in other.items() if name.startswith(a)), name) for name in self.names]
-        return np.array([self.names.index(name) for name in swapped])
+        return np.array(other_side(self.names))
 
     @property
     def _limbs(self) -> Limbs:

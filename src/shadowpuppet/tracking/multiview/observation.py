@@ -83,19 +83,17 @@ class MultiviewObservation:
         differing = [silhouette_costs(picture, observation, poses) for picture, observation in self.silhouettes]
         return sum(differing, np.zeros(len(poses))) / max(self.area, 1)
 
-    def overlaps(self, pose: Array, masks: Sequence[Mask | None]) -> Array:
-        """Intersection over union of a drawn pose (D,) and each of the masks (H, W) in which a person is visible, (C,); NaN for others."""
-        found = np.full(len(masks), np.nan)
-        for n, mask in enumerate(masks):
-            if mask is not None and may_be_person(mask):
-                seen = Observation.of(half_size(mask), self.left_out[n])
-                found[n] = seen.cost_and_overlap(self.views.pictures[n].draw(pose))[1]
+    def overlaps(self, pose: Array) -> Array:
+        """Intersection over union of a drawn pose (D,) and the silhouette of each camera, (C,); NaN where no person is visible."""
+        found = np.full(len(self.masks), np.nan)
+        for n, (picture, observation) in zip(self.seen, self.silhouettes):
+            found[n] = observation.cost_and_overlap(picture.draw(pose))[1]
         return found
 
     def overlap(self, pose: Array) -> float:
         """Intersection over union of a drawn pose (D,) and the silhouettes, mean of all pictures; 0 without silhouettes."""
-        overlaps = [observation.cost_and_overlap(picture.draw(pose))[1] for picture, observation in self.silhouettes]
-        return float(np.mean(overlaps)) if overlaps else 0.0
+        overlaps = self.overlaps(pose)[list(self.seen)]
+        return float(np.mean(overlaps)) if len(overlaps) else 0.0
 
 
 def half_size(mask: Mask | None) -> Mask:

@@ -32,7 +32,6 @@ from shadowpuppet.tracking.unexplained import Unexplained, look_beside
 MIN_POINTS, MIN_EXTENT = 50, 0.5
 """Smallest number and smallest extent (m) of the surface points of a person."""
 MANY_CAMERAS = 6
-NOTHING = np.zeros(0)
 PARTICLES_FEW_CAMERAS, PARTICLES_MANY_CAMERAS = 40, 16
 """Default particle numbers below and from `MANY_CAMERAS` cameras."""
 
@@ -53,7 +52,7 @@ class MultiviewState(NamedTuple):
     """`tracked`, `uncertain`, `lost` or `absent`."""
     unexplained: tuple[Unexplained | None, ...] = ()
     """What each camera's silhouettes, at half size, have beside the body; empty if nothing is left out."""
-    usual: Array = NOTHING
+    usual: Array = np.zeros(0)
     """Overlap in each camera's picture as it has been (C,), NaN without a silhouette so far; empty at the beginning."""
 
 
@@ -96,12 +95,12 @@ class MultiviewTracker:
         """The state `found` in a frame, or that found without the one camera that contradicts the others, if there is one."""
         assert self.carve is not None
         masks, usual = observation.masks, state.usual
-        now, states, overlaps = observation.overlaps(found.pose, masks), dict[int, MultiviewState](), dict[int, Array]()
+        now, states, overlaps = observation.overlaps(found.pose), dict[int, MultiviewState](), dict[int, Array]()
         for n in suspects(usual, now):
             rest = [None if m == n else mask for m, mask in enumerate(masks)]
             without = MultiviewObservation(self.views, self.carve(rest), rest, observation.also, observation.left_out)
             states[n] = self.follow(rng, state, without)
-            overlaps[n] = observation.overlaps(states[n].pose, masks)
+            overlaps[n] = observation.overlaps(states[n].pose)
         odd = odd_one(usual, now, overlaps)
         found, now = (found, now) if odd is None else (states[odd], overlaps[odd])
         return found._replace(usual=adapted(usual, now, odd))

@@ -1,7 +1,7 @@
 """People as upright figures on the floor: the fewest that explain the silhouettes of all cameras.
 
-One after the other the figure is chosen that explains most silhouette which none before explains; where cameras see none of it, it has to
-give way. So a ghost (a place that all cameras see as silhouette by coincidence) is left out: it explains nothing that is left.
+Figures are chosen one at a time: always the one that covers most silhouette that no chosen figure covers, less what it covers of pixels
+that are no silhouette. A ghost (a place that all cameras see as silhouette by coincidence) is left out, as it covers nothing that is left.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def _middle(floor: Floor, best: Array, cell: int) -> Array:
 
 
 def _height(floor: Floor, place: Array, about: float, state: NDArray[np.uint8]) -> float:
-    """Height of a figure of `about` that height: where its silhouettes end, in the views where nobody else is behind the head."""
+    """Height of a figure of `about` that height: where its silhouettes end, in the views where no other figure is behind the head."""
     z, tops = np.arange(0.6 * about, about + 0.35, 0.03), list[float]()
     across = np.array([-0.06, 0.0, 0.06])
     for n, camera in enumerate(floor.cameras):

@@ -1,7 +1,8 @@
 """The floor on which people stand, and the pixels on which an upright figure at each of its places would be seen.
 
-A figure is a few rows of points across the view: trunk and head, which are silhouette; legs, of which one is; and guards above the head and
-below the feet, which are not, so that a figure has the right size and distance. (Fleuret et al. 2008 compare boxes with silhouettes so.)
+A figure is a few rows of points across the view. Points of trunk and head must be silhouette, and one of the points at each height of the
+legs; guards above the head and below the feet must not, so that a figure has the right size and distance. (Fleuret et al. 2008 compare
+boxes with silhouettes so.)
 """
 
 from __future__ import annotations

@@ -28,8 +28,8 @@ class Standing(NamedTuple):
 
 
 def standing(times: Array, names: Sequence[str], markers: Array, floor: float | None) -> Standing | None:
-    """The terms for smoothed markers (T, M, 3), metres, of which the first are the joints `names`, at `times` (T,); None without soles, or
-    a floor."""
+    """The terms for smoothed markers (T, M, 3), metres, at `times` (T,) s; the first markers are the joints `names`. None without soles or
+    without a floor."""
     contacts = find_contacts(times, names, markers[:, : len(names)], floor)
     if contacts is None:
         return None
