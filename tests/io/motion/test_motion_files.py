@@ -269,7 +269,7 @@ def test_what_is_not_ours_is_said(tmp_path):
 @pytest.mark.shared
 def test_motion_capture_of_the_database(shared):
     table = read_motion(shared / "mocap" / "03_01.amc")
-    assert table.names == JOINTS
+    assert table.names == JOINTS[:17]  # without heels and toes
     assert up_axis(table) == "+z"
     assert 0.7 < leg_length(table) < 1.0
     for name in ("walking", "jogging", "boxing"):
