@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import runs
 from made import write_film
-from measured import NAMES, moved, person, write_run
+from measured import NAMES, TRUTH, moved, run_that_errs, write_run
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import app as cli
@@ -28,7 +28,6 @@ from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.overlay_video import grid_of
 
-TRUTH = person(4, 15)
 SIZE = (160, 120)
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 
@@ -38,15 +37,6 @@ def camera(name: str = "cam", turn: float = 0.0) -> Camera:
     c, s = np.cos(turn), np.sin(turn)
     R = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     return Camera(name, SIZE, [[140, 0, 79.5], [0, 140, 59.5], [0, 0, 1]], T_camera_world=rigid(R, [0, 0.95, 3.0]))
-
-
-def run_that_errs(folder, worst=(12, 40), **more):
-    """A run whose left hand is far off in some frames."""
-    places = TRUTH.positions + np.random.default_rng(1).normal(size=TRUTH.positions.shape) * 0.01
-    for n, frame in enumerate(worst):
-        places[frame, NAMES.index("left_wrist")] += 1.0 + n
-    write_joints(folder / "truth.csv", TRUTH)
-    return write_run(folder / "run", JointTable(TRUTH.times, TRUTH.names, places), truth=folder / "truth.csv", **more)
 
 
 class Checked(HTMLParser):

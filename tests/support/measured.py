@@ -8,6 +8,7 @@ import numpy as np
 
 from shadowpuppet.evaluation.evaluation import Comparison, measure_run
 from shadowpuppet.evaluation.joint_angles import compared_poses, turn_errors
+from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.run_writer import RunWriter
 from shadowpuppet.motion.metrics import GROUPS
 from shadowpuppet.motion.motion import JointTable, MotionFrame
@@ -47,6 +48,18 @@ def write_run(folder: Path, table: JointTable, *, sd=None, status=None, truth: P
                                   None if blank else places, joint_sd=None if sd is None else np.broadcast_to(sd, places.shape),
                                   cost=100.0 + n, overlap=0.9 - 0.001 * n))  # fmt: skip
     return folder
+
+
+TRUTH = person(4, 15)
+
+
+def run_that_errs(folder: Path, worst=(12, 40), **more) -> Path:
+    """A run whose left hand is far off in some frames."""
+    places = TRUTH.positions + np.random.default_rng(1).normal(size=TRUTH.positions.shape) * 0.01
+    for n, frame in enumerate(worst):
+        places[frame, NAMES.index("left_wrist")] += 1.0 + n
+    write_joints(folder / "truth.csv", TRUTH)
+    return write_run(folder / "run", JointTable(TRUTH.times, TRUTH.names, places), truth=folder / "truth.csv", **more)
 
 
 def evaluate_run(folder, truth=None, joints=None, **more) -> dict:

@@ -49,6 +49,7 @@ def error(registration: Registration, image: np.ndarray, homography: np.ndarray)
     """Greatest distance, pixels, of grid points where a movement puts them and where they are."""
     found = registration.movement(image)
     assert found is not None
+    assert found[2, 2] == pytest.approx(1)
     pixels = np.array([[WIDTH / 2, 0, (WIDTH - 1) / 2], [0, WIDTH / 2, (HEIGHT - 1) / 2], [0, 0, 1]])
     grid = np.array([[x, y, 1.0] for x in np.linspace(0, WIDTH - 1, 5) for y in np.linspace(0, HEIGHT - 1, 5)]).T
     there, right = (matrix @ grid for matrix in (pixels @ found @ np.linalg.inv(pixels), homography))

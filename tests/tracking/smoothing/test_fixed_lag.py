@@ -48,6 +48,12 @@ def test_the_lag_is_of_whole_frames_and_at_least_one(lag, late, rng):
     assert len(rest) == late
 
 
+def test_a_lag_halfway_between_two_frames_is_rounded_down(rng):
+    _, raw = tracked("rounded", rng, 6)
+    follow = FixedLag(smoother("rounded"), 0.375)
+    assert [len(follow(frame._replace(time=n / 4))) for n, frame in enumerate(raw.frames())] == [0, 1, 1, 1, 1, 1]
+
+
 def test_what_follows_cannot_change_what_was_given(rng):
     _, raw = tracked("rounded", rng, 20)
     whole, _ = given(raw, "rounded", 0.1)
