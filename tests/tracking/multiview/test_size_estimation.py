@@ -107,34 +107,38 @@ def test_a_person_in_a_few_frames_only_is_taken_as_expected():
     assert np.isnan(found.residual)
 
 
-def test_heights_around_the_extent_are_tried_and_the_one_that_fits_is_taken(monkeypatch):
-    """None that no person has; of equal costs the usual one."""
-    tried = []
+@pytest.mark.parametrize(("extent", "fits", "shares", "best"), [
+    (0.55, 1.1, [0.93, 1.0, 1.08, 1.2], 1.2),
+    (1.02, 1.1, [0.8, 0.86, 0.93, 1.0, 1.08, 1.2], 1.08),
+    (2.4, 1.1, [0.8, 0.86, 0.93, 1.0], 0.8),
+    (1.8, None, [0.8, 0.86, 0.93, 1.0, 1.08, 1.2], 0.93),  # all fit: the usual one
+])
+def test_possible_heights_near_the_extent_are_tried(monkeypatch, extent, fits, shares, best):
+    tried, nobody = [], points([])
 
-    class Fits:
-        """Costs little at 1.1 m, or the same at all heights."""
-
+    class Tracker:
         def __init__(self, height, cameras, settings):
             tried.append(height)
-            self.cost = abs(height - 1.1) if best else 1.0
+            self.cost = 1.0 if fits is None else abs(height - fits)
 
         def start(self, rng, cloud, masks):
-            return types.SimpleNamespace(cost=self.cost if cloud is not nobody else 1e9, status="absent" if cloud is nobody else "tracked")
+            return types.SimpleNamespace(cost=1e9 if cloud is nobody else self.cost, status="absent" if cloud is nobody else "tracked")
 
-    nobody = points([])
-    monkeypatch.setattr("shadowpuppet.tracking.multiview.size_estimation.MultiviewTracker", Fits)
-    for extent, best, wanted, found in ((0.55, True, [0.93, 1.0, 1.08, 1.2], 1.2), (1.02, True, [0.8, 0.86, 0.93, 1.0, 1.08, 1.2], 1.08),
-                                        (2.4, True, [0.8, 0.86, 0.93, 1.0], 0.8), (1.8, False, [0.8, 0.86, 0.93, 1.0, 1.08, 1.2], 0.93)):
-        tried.clear()
-        first = [(points(np.linspace(0, extent, 400)), ())] * 9 + [(nobody, ())] * 9
-        height = estimate_height(np.random.default_rng(0), lambda height: height, (), first, SETTINGS)
-        seen = observed_height(first)
-        assert seen is not None
-        np.testing.assert_allclose(tried, np.array(wanted) * seen)
-        assert height == pytest.approx(found * seen)
-    assert estimate_height(np.random.default_rng(0), lambda height: height, (), [(nobody, ())], SETTINGS) is None
-    far = [(points(np.linspace(0, 9.0, 400)), ())]
-    assert estimate_height(np.random.default_rng(0), lambda height: height, (), far, SETTINGS) is None
+    monkeypatch.setattr("shadowpuppet.tracking.multiview.size_estimation.MultiviewTracker", Tracker)
+    first = [(points(np.linspace(0, extent, 400)), ())] * 9 + [(nobody, ())] * 9
+    seen = observed_height(first)
+    assert seen is not None
+    assert height_of(first) == pytest.approx(best * seen)
+    np.testing.assert_allclose(tried, np.array(shares) * seen)
+
+
+def height_of(first) -> float | None:
+    return estimate_height(np.random.default_rng(0), lambda height: height, (), first, SETTINGS)
+
+
+def test_where_nobody_or_a_giant_is_seen_no_height_is_found():
+    assert height_of([(points([]), ())]) is None
+    assert height_of([(points(np.linspace(0, 9.0, 400)), ())]) is None
 
 
 # What is known before -------------------------------------------------------------------------------------------------
