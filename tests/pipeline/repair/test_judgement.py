@@ -1,0 +1,118 @@
+"""What a check of a calibration concludes from made figures: sets compared, certain offsets, [start], sentences."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shadowpuppet.calibration.agreement import MAX_DISAGREEMENT
+from shadowpuppet.calibration.time_offset import TimeOffsets
+from shadowpuppet.pipeline.repair.check import (
+    SETS_COMPARED,
+    RotationFix,
+    _certain,
+    _directions,
+    _in_frames,
+    _standing_out,
+    _starts,
+    aligned_sets,
+    doubts_of,
+)
+
+NAMES = ("a", "b", "c", "d")
+
+
+def offsets(frames, spread=(0.1,) * 4) -> TimeOffsets:
+    return TimeOffsets(names=NAMES, frames=frames, spread=spread, pairs=((None, 0.5, 0.25, 0.0),) * 4)
+
+
+@pytest.mark.parametrize("shifts", [(0, 0, 0, 0), (3.4, 0, 0, 0), (0, -2.0, 5.6, 0)])
+def test_sets_are_spread_over_all_that_every_camera_has(shifts):
+    rows = [[(frame, camera) for camera in range(4)] for frame in range(40)]
+    found = aligned_sets(rows, shifts)
+    steps = [round(shift) for shift in shifts]
+    begins = [row[3][0] for row in found]
+    assert begins[0] == -min(steps)
+    assert begins[-1] == 39 - max(steps)
+    assert len(found) == SETS_COMPARED
+    assert np.ptp(np.diff(begins)) <= 1
+    assert all(row == [(begin + step, camera) for camera, step in enumerate(steps)] for row, begin in zip(found, begins))
+
+
+def test_of_too_few_sets_what_is_missing_is_nothing():
+    assert aligned_sets([["a0", "b0"], ["a1", "b1"]], [0, 3]) == [["a0", None]]
+    assert aligned_sets([["a0", "b0"], ["a1", "b1"]], [0, 0]) == [["a0", "b0"], ["a1", "b1"]]
+
+
+def test_an_offset_is_certain_beyond_its_limits():
+    found = SimpleNamespace(wrong=("b",))
+    assert _certain(offsets((0.51, 0.51, -0.51, 0.5)), found) == [0.51, 0.0, -0.51, 0.0]
+    assert _certain(offsets((1.6, 1.6, None, -1.4), (1.0, 1.0, None, 1.0)), found) == [1.6, 1.6, 0.0, 0.0]
+    assert _certain(offsets((0.6, 1.5, 0.6, 0.6), (None, 0.0, 0.39, 0.41)), found) == [0.6, 0.0, 0.6, 0.0]
+
+
+def test_offsets_of_sets_are_those_of_frames():
+    found = _in_frames(offsets((1.234, None, -0.5, 0.0)), 3)
+    assert found.frames == (3.7, None, -1.5, 0.0)
+    assert found.spread == (0.3,) * 4
+    assert found.pairs[1] == (None, 1.5, 0.75, 0.0)
+
+
+def test_starts_are_those_there_are_and_the_offsets_from_the_earliest():
+    footage = [SimpleNamespace(camera=SimpleNamespace(name=name), view=SimpleNamespace(start=start))
+               for name, start in zip(NAMES, (0.0, 0.5, 0.0, 1.0))]
+    rig = SimpleNamespace(footage=footage, rate=25.0)
+    assert _starts(rig, [0.0, 0.0, 0.0, 0.0], 2) == {}
+    assert _starts(rig, [0.0, 1.0, -2.0, 0.0], 2) == {"a": 0.16, "b": 0.74, "d": 1.16}
+
+
+def agreement(apart, **more):
+    return SimpleNamespace(**({"names": NAMES, "apart": apart, "limit": 20.0, "wrong": (), "hopeless": False, "remedy": None,
+                               "doubts": lambda: []} | more))  # fmt: skip
+
+
+def test_the_worst_camera_stands_out():
+    slight = 0.004 / MAX_DISAGREEMENT * 20
+    assert _standing_out(agreement((0.1, slight - 0.01, 0.1, 0.1)), 3) == ()
+    assert _standing_out(agreement((0.1, slight + 0.01, 0.1, 0.1)), 3) == ("b",)
+    assert _standing_out(agreement((10, 10, 10, 29.9)), 3) == ()
+    assert _standing_out(agreement((10, 10, 10, 30.1)), 3) == ("d",)
+    assert _standing_out(agreement((10, 10, None, 30.1)), 3) == ("d",)
+    assert _standing_out(agreement((0.1, None, None, 30.1)), 1) == ()
+    assert _standing_out(agreement((None,) * 4), 3) == ()
+
+
+def turn(**angles):
+    return SimpleNamespace(**({"right": 0.0, "down": 0.0, "clockwise": 0.0, "degrees": 3.0} | angles))
+
+
+def test_directions():
+    assert _directions(turn(right=2.04, down=-1.0, clockwise=0.05)) == "2.0 to the right, 1.0 up, 0.1 clockwise"
+    assert _directions(turn(right=-2.0, down=1.0, clockwise=-3.0)) == "2.0 to the left, 1.0 down, 3.0 counter-clockwise"
+    assert _directions(turn(right=0.04)) == "hardly"
+
+
+def check(**changes):
+    plain = {"agreement": agreement((1.0, 2.0, 1.5, 1.0)), "late": (), "lateness": None, "starts": {}, "turns": {}}
+    return SimpleNamespace(**(plain | changes))
+
+
+def test_doubts():
+    assert doubts_of(check()) == []
+    late = {"late": ("b", "c"), "lateness": offsets((0.0, 2.25, -3.0, 0.4)), "starts": {"a": 0.12, "b": 0.123456}}
+    said = ("the films do not begin together (b 2.2 frames late, c 3.0 frames early): put into [start] of recording.toml: "
+            "a = 0.12, b = 0.1235")
+    assert doubts_of(check(**late)) == [said]
+    assert doubts_of(check(**late, agreement=agreement((None,) * 4, hopeless=True, remedy="swap them"))) == [said, "swap them"]
+    fix = RotationFix(turn(right=3.0), 1.25)
+    doubts = ["camera 'b' disagrees much", "camera 'c' disagrees much"]
+    found = doubts_of(check(turns={"b": fix}, agreement=agreement((1.0, 9.0, 1.5, None), doubts=lambda: doubts)))
+    assert found == ["camera 'c' disagrees much",
+                     "camera 'b' disagrees with the others by 9.0 pixels, they by 1.5 at most; it is as if it had been turned by 3.0 "
+                     "degrees (3.0 to the right) since it was calibrated: turned back, 1.2 pixels would be left; calibrate it again, or "
+                     "leave it out: --camera a,c,d"]  # fmt: skip
+    assert doubts_of(check(agreement=agreement((1.0, 9.0, 1.5, 1.0)))) == [
+        "camera 'b' disagrees with the others by 9.0 pixels, they by 1.5 at most; calibrate it again, or leave it out: --camera a,c,d"]
+    assert doubts_of(check(agreement=agreement((1.0, 9.0, 1.5, 1.0), doubts=lambda: ["a word"]))) == ["a word"]
