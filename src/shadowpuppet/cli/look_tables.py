@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -82,12 +83,17 @@ def _rig_table(look: RigLook) -> RenderableType:
                 f"{100 * camera.quality.area:.1f} %", "" if camera.exact_overlap is None else f"{camera.exact_overlap:.3f}",
                 "" if apart is None else f"{apart:.1f} px") for camera, apart in zip(look.cameras, look.agreement.apart))  # fmt: skip
     keys = sorted({camera.key.split(":")[0] for camera in look.cameras} - {"none"})
-    below = [("background", "; ".join(sorted({camera.background.replace(camera.name, "<camera>") for camera in look.cameras}))),
+    below = [("background", "; ".join(sorted(set(map(_background, look.cameras))))),
              ("keys", ", ".join(keys) or None), *_rig_scale(look)]
     columns = ("camera", "pixels", "wide", "stands at, m", "person", "exact", "apart")
     if all(camera.exact_overlap is None for camera in look.cameras):
         columns, cameras = columns[:5] + columns[6:], (row[:5] + row[6:] for row in cameras)
     return Group(pairs(_rig_rows(look)), "", table("", columns, cameras, right=range(2, len(columns))), "", pairs(below))
+
+
+def _background(camera: CameraLook) -> str:
+    """Where the silhouettes come from, the same for cameras that differ by name only; one named `a` is not every a of the text."""
+    return re.sub(rf"(?<!\w){re.escape(camera.name)}(?!\w)", "<camera>", camera.background)
 
 
 def _pixels(camera: CameraLook) -> str:
