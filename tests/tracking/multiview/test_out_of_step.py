@@ -7,7 +7,7 @@ import pytest
 
 from shadowpuppet.camera.rasterize import pack
 from shadowpuppet.tracking.frozen import LEAST
-from shadowpuppet.tracking.multiview.out_of_step import AHEAD, StepWatch
+from shadowpuppet.tracking.multiview.out_of_step import AHEAD, ENOUGH, LAGS, LATE, MEMORY, MISFIT, MOST, OTHERS, PACE, StepWatch
 
 RATE, FRAMES = 20, 80
 
@@ -79,3 +79,78 @@ def test_a_person_who_stands_still_tells_nothing():
         masks = [person(50, 1 + n), person(53, 2 + n), person(50)]
         assert all(mask is not None for mask in watch(n / RATE, masks))
         watch.tracked((pack(person(50)[::2, ::2]),) * 3)
+
+
+# What a silhouette shows ----------------------------------------------------------------------------------------------
+
+
+def noted(seed: int, frames: int = 30, cameras: int = 2) -> tuple[StepWatch, np.ndarray]:
+    """A watch after frames of random silhouettes and bodies, and the three sums by plain loops (3, cameras, 2 x LAGS)."""
+    rng = np.random.default_rng(seed)
+    watch, sums, past = StepWatch(cameras), np.zeros((3, cameras, 2 * len(LAGS))), []
+    for n in range(frames):
+        seconds = n / 30 + rng.uniform(-0.002, 0.002)
+        bodies = [np.roll(person(40), round(20 * np.sin(n / 4)) + 3 * c, 1)[::2, ::2] for c in range(cameras)]
+        masks = [np.roll(np.repeat(np.repeat(body, 2, 0), 2, 1), rng.integers(-6, 6), 1) for body in bodies]
+        watch(seconds, masks)
+        watch.tracked([pack(body) for body in bodies])
+        if past:
+            sums *= np.exp((past[-1][0] - seconds) / MEMORY)
+        for c in range(cameras):
+            found, mask = np.zeros((3, 2, len(LAGS))), masks[c][::2, ::2]
+            for k, lag in enumerate(LAGS):
+                then = min(past, key=lambda each: abs(each[0] - (seconds - lag)), default=None)
+                if then is None or abs(then[0] - (seconds - lag)) >= 0.035:
+                    continue
+                own, drawn, other = then[1][c], bodies[c], then[2][c]
+                change = (drawn ^ other).sum() / mask.sum()
+                for way, (present, earlier) in enumerate((((mask ^ drawn), (mask ^ other)), ((own ^ other), (own ^ drawn)))):
+                    left = earlier.sum() / mask.sum()
+                    found[:, way, k] = present.sum() / mask.sum() - left, change, left * change
+            found = found.reshape(3, -1)
+            kept = np.clip((MOST - found[1]) / np.maximum(sums[1, c], 1e-9), 0, 1)
+            sums[:, c] = kept * sums[:, c] + found
+        past.append((seconds, [mask[::2, ::2] for mask in masks], bodies))
+    return watch, sums
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_evidence_is_that_of_plain_loops(seed):
+    watch, sums = noted(seed)
+    np.testing.assert_allclose([watch._gain, watch._change, watch._misfit], sums, atol=1e-9)
+    assert watch._seen[0].seconds >= watch._seen[-1].seconds - LAGS[-1] - PACE
+
+
+def verdict(gain, cameras: int = 4, change=1.0, misfit=0.0, out=()) -> tuple[str, ...]:
+    """Of made sums; `gain`: by (camera, lag). A body of the other moment's opposite explains nothing."""
+    watch = StepWatch(cameras)
+    watch._change[:], watch._misfit[:], watch._gain[:] = change, misfit, -0.5
+    for place, value in gain.items():
+        watch._gain[place] = value
+    watch._out = [out[n] if n < len(out) else "" for n in range(cameras)]
+    return watch._verdict()
+
+
+def test_verdicts():
+    early, fits = len(LAGS), LATE + 0.01
+    assert verdict({(1, 2): fits}) == ("", "late", "", "")
+    assert verdict({(1, early + 2): fits}) == ("", "early", "", "")
+    assert verdict({(1, 0): LATE}) == ("",) * 4
+    assert verdict({(1, 2): fits}, change=ENOUGH - 0.01) == ("",) * 4
+    assert verdict({(1, 2): ENOUGH * fits}, change=ENOUGH)[1] == "late"
+    assert verdict({(1, 2): fits, (2, 0): OTHERS * fits}) == ("",) * 4  # the body is wrong, not the camera
+    assert verdict({(1, 2): fits, (2, 0): OTHERS * fits - 0.01})[1] == "late"
+    assert verdict({(1, 2): fits, (1, early + 2): 0.0}) == ("",) * 4  # a body that jitters
+    assert verdict({(1, 2): fits, (1, early + 2): -0.01, (1, early + 1): 0.1})[1] == "late"
+    assert verdict({(1, 2): fits}, misfit=MISFIT)[1] == "late"
+    assert verdict({(1, 2): fits}, misfit=MISFIT + 0.01) == ("",) * 4
+    assert verdict({(1, 2): fits}, cameras=3)[1] == "late"
+    assert verdict({(1, 2): fits}, cameras=2) == ("", "")
+
+
+def test_those_out_of_step_stay_so_until_the_present_explains_them():
+    fits = LATE + 0.01
+    assert verdict({(1, 2): 0.01}, out=("", "late")) == ("", "late", "", "")
+    assert verdict({(1, 2): -0.01}, out=("", "early")) == ("",) * 4
+    assert verdict({(1, 2): 0.3, (2, 1): fits}, cameras=5, out=("", "late"))[2] == "late"  # those out of step are no witnesses
+    assert verdict({(1, 2): 0.3, (2, 1): fits}, cameras=4, out=("", "late"))[2] == ""  # most cameras decide what the time is
