@@ -49,3 +49,10 @@ def test_unknown_frames_do_not_count(rng):
     run = exchanged(truth, slice(0, 40), "elbow", "wrist")
     run.positions[20:] = np.nan
     assert exchanges(run, truth)["arms"] == {"frames": 20, "share": 1.0, "longest_s": 1.0}
+
+
+def test_limbs_as_near_to_one_side_as_to_the_other_are_not_exchanged(rng):
+    truth = table(rng)
+    turned = exchanged(truth, slice(0, 40), "elbow", "wrist", "knee", "ankle")
+    middle = JointTable(truth.times, NAMES, (truth.positions + turned.positions) / 2)
+    assert exchanges_text(exchanges(middle, truth)) == "never"

@@ -1,0 +1,47 @@
+"""What is doubted about a person's sizes and place, for made fits."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS
+from shadowpuppet.pipeline.person import DOUBTFUL, ELSEWHERE, NOBODY, POOR, _doubts, _few
+from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
+
+
+def doubts(overlaps=None, place=0.9, source="proportions", start=0.9, moments=4):
+    fit = SimpleNamespace(overlaps={f"m{n}": 0.9 for n in range(4)} if overlaps is None else overlaps, place_overlap=place)
+    return [(doubt.short.split(":")[0], doubt.weight) for doubt in _doubts(fit, source, start, moments)]
+
+
+@pytest.mark.parametrize("name", DOUBTFUL)
+def test_references_that_do_not_fit(name):
+    said = [(f"reference {name} does not fit", NOTED)]
+    assert doubts({name: DOUBTFUL[name] - 0.001}, source="references", moments=1) == said
+    assert doubts({name: DOUBTFUL[name]}, source="references", moments=1) == []
+    assert doubts({name: 0.1}, moments=1) == []
+
+
+def test_a_distance_that_is_uncertain():
+    assert doubts(place=UNCERTAIN_OVERLAP) == []
+    assert doubts(place=UNCERTAIN_OVERLAP - 0.001) == [("distance uncertain", HARMFUL)]
+
+
+def test_somebody_who_changes_place_or_is_not_there():
+    assert doubts(start=POOR) == []
+    assert doubts(start=POOR - 0.001) == [("body fits the first silhouette badly", HARMFUL)]
+    assert doubts(start=NOBODY) == [("body fits the first silhouette badly", HARMFUL)]
+    assert doubts(start=NOBODY - 0.001) == [("no person fits the first silhouette", RUINOUS)]
+    assert ELSEWHERE == 0.25
+    assert doubts(moments=5) == []  # one of five
+    assert doubts({"a": 0.9, "b": 0.9, "c": 0.9}, moments=4, start=0.1) == [("person changes place", HARMFUL)]
+    assert doubts({"front_t_pose": 0.9}, moments=4, source="references") == []
+
+
+def test_a_few_masks_are_spread():
+    masks = [np.full((1, 1), n % 2 == 0) for n in range(30)]
+    found = _few(masks, 4)
+    assert [next(k for k, mask in enumerate(masks) if mask is each) for each in found] == [0, 9, 19, 29]
