@@ -177,10 +177,10 @@ def _placed(session: Session, names: Sequence[str], cameras: Sequence[Camera], c
     moments: list[dict[int, View]] = [{} for _ in range(count)]
     speeds: list[dict[int, Array]] = [{} for _ in range(count)]
     for n, name in enumerate(names):
-        film = carried.get(name)
-        for k, view in enumerate(film.views if film is not None else ()):
-            speed = film.velocities[k] if film is not None else None
-            if view is not None and film is not None and (speed is not None or film.rate == 0):
+        if (film := carried.get(name)) is None:
+            continue
+        for k, (view, speed) in enumerate(zip(film.views, film.velocities)):
+            if view is not None and (speed is not None or film.rate == 0):
                 moments[k][n] = view
                 if speed is not None:
                     speeds[k][n] = speed

@@ -53,7 +53,8 @@ SEGMENTS = (
         Segment(f"{side}_ankle", f"{side}_heel", f"{side}_toe", 0.0133, 0.421, (0.278, 0.262, 0.132)),
     )),
 )  # fmt: skip
-"""Means of women and men (de Leva 1996, table 4). The middle and upper trunk meet at the waist, the middle of our chest."""
+"""Means of women and men (de Leva 1996, table 4); their masses are 1 together. The middle and upper trunk meet at the waist, the middle of
+our chest."""
 
 
 class Mass(NamedTuple):
@@ -76,7 +77,7 @@ def body_masses(animation: Animation, moving: Mapping[str, str], weight: float) 
         owner = moving.get(segment.joint, "pelvis")
         fallback = places.get(segment.joint, places[owner])
         start, end = (places.get(name, fallback) - places[owner] for name in (segment.start, segment.end))
-        mass = segment.mass / sum(each.mass for each in SEGMENTS) * weight
+        mass = segment.mass * weight
         parts.setdefault(owner, []).append((mass, start + segment.centre * (end - start), mass * _inertia(end - start, segment.radii)))
     return {owner: _together(own) for owner, own in parts.items()}
 
