@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import made
 import made_rig
@@ -168,3 +169,21 @@ def test_pictures_of_one_time_are_a_set():
     other.ended = True
     assert newest.take() is None
     assert not newest.waiting
+
+
+@pytest.mark.parametrize(("state", "said"), [
+    ({"phase": "waiting", "_hint": "walk into the middle"}, ("walk into the middle", None)),
+    ({"phase": "measuring"}, ("measuring: one moment", None)),
+    ({"phase": "tracking", "_gone": True}, ("the body does not fit any more: measure again", None)),
+    ({"phase": "tracking", "_gone": False, "_aside": lambda: "set aside: b (late)"}, ("set aside: b (late)", None)),
+    ({"phase": "learning", "_collectors": [SimpleNamespace(left=left, message=f"{left} s") for left in (1.0, 3.0, 2.0)]}, ("3.0 s", 3.0)),
+])
+def test_what_is_said_in_each_phase(state, said):
+    assert RigSession._message(SimpleNamespace(**state), ()) == said
+
+
+def test_cameras_that_are_set_aside_are_named_in_order():
+    watched = SimpleNamespace(watchdogs=[SimpleNamespace(name=name) for name in "abc"],
+                              _watch=SimpleNamespace(present={2: "late", 0: "frozen"}))  # fmt: skip
+    assert RigSession._aside(watched) == "set aside: a (frozen), c (late)"
+    assert RigSession._aside(SimpleNamespace(_watch=None)) == ""

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from live_film import EMPTY, HEIGHT, QUICK, RATE, Clock, frames
 
+from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.live import base_session
@@ -130,6 +131,16 @@ def test_angles_are_reported_in_degrees_within_their_limits(whole):
         assert angle.low - 1 <= angle.value <= angle.high + 1
     assert {angle.name for angle in outcomes[-1].view.angles} >= {"torso bow", "left shoulder abduction", "right elbow flexion"}
     assert len(outcomes[-1].view.angles) == 11
+
+
+def test_limits_of_angles_are_whole_degrees_and_half_a_turn_where_there_are_none():
+    body = make_body("anatomical", average_sizes("anatomical", 1.7))
+    pose = body.skeleton.pose(root_heading=1.0, left_elbow_flexion=0.5)
+    found = {angle.name: angle for angle in base_session._angles(body, pose)}
+    assert found["root heading"][1:] == (pytest.approx(57.29578), -180, 180)
+    assert found["left elbow flexion"][1:] == (pytest.approx(28.64789), 0, 150)
+    assert "root x" not in found
+    assert np.isnan([angle.value for angle in base_session._angles(body, None)]).all()
 
 
 def test_the_same_seed_is_the_same_session(pictures, tracking):

@@ -83,3 +83,16 @@ def test_each_has_a_truth_and_the_ready_silhouettes_are_of_all(tmp_path):
     alone = read_recording(synthesize(replace(spec, scene=Scene(empty_seconds=0.5)), tmp_path / "one"))
     assert alone.truths == ()
     assert alone.views[0].masks == tmp_path / "one" / "masks" / "cam1.mkv"
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 7])
+def test_dancers_look_at_the_middle_and_walkers_have_it_to_their_left(count):
+    for together, aside in (("dance", 0), ("round", 90)):
+        people = members(together, count)
+        places = np.array([(one.x, one.y) for one in people])
+        for one, place in zip(people, places):
+            to_middle = places.mean(0) - place
+            heading = -90 + one.turn_deg + aside  # at 0 they look along -y
+            np.testing.assert_allclose(to_middle / np.linalg.norm(to_middle), [np.cos(np.radians(heading)), np.sin(np.radians(heading))],
+                                       atol=1e-9)  # fmt: skip
+            assert -180 <= one.turn_deg < 180
