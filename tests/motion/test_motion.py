@@ -180,3 +180,9 @@ def test_names_that_no_table_can_have_are_said(names):
 def test_an_unknown_joint_is_said():
     with pytest.raises(ShadowPuppetError, match="unknown joint 'toe'; there are: left_hand, neck, right_hand"):
         a_motion().table.select(["neck", "toe"])
+
+
+@pytest.mark.parametrize("shape", [(2, 3), (3, 3, 3), (2, 2, 3), (2, 3, 2), (2, 9)])
+def test_a_table_of_another_shape_is_said(shape):
+    with pytest.raises(ShadowPuppetError, match=r"positions: found shape .*, expected \(2, 3, 3\)"):
+        JointTable(np.arange(2.0), JOINTS, np.zeros(shape))
