@@ -1,0 +1,90 @@
+"""Films of a board: which files are films, when they are looked at, how fast corners move."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import boards
+import numpy as np
+import pytest
+
+from shadowpuppet.calibration.boards import films
+from shadowpuppet.calibration.boards.detection import View
+from shadowpuppet.calibration.boards.films import LEAST_STEP, SAMPLES, _Facts, _velocity, films_in, read_films
+from shadowpuppet.errors import CalibrationError
+
+
+def view(ids, pixels, time: float = 0.0) -> View:
+    return View(time, np.array(ids, np.int64), np.array(pixels, float), 1.0)
+
+
+def test_films_pictures_and_folders_of_pictures_are_named_by_their_cameras(tmp_path):
+    for name in ("a.mp4", "b.jpg", "c/1.png", "empty/note.txt", "note.txt", ".hidden.mp4"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    assert films_in(tmp_path) == {"a": tmp_path / "a.mp4", "b": tmp_path / "b.jpg", "c": tmp_path / "c"}
+    assert films_in(tmp_path / "nowhere") == {}
+    (tmp_path / "a.png").touch()
+    with pytest.raises(CalibrationError, match=r"found a\.mp4, a\.png for the camera 'a', expected one of them"):
+        films_in(tmp_path)
+
+
+def test_velocities_of_corners_are_their_own_or_the_others_mean():
+    before = view([1, 2, 3, 4], [[0, 0], [10, 0], [20, 0], [30, 0]])
+    after = view([4, 2, 9, 1], [[33, 0], [10, 1], [5, 5], [0, 2]])
+    np.testing.assert_allclose(_velocity(before, after, 10.0), [[0, 20], [0, 10], [10, 10], [30, 0]])
+    assert _velocity(before, view([1, 9], [[0, 2], [0, 0]]), 10.0) is None  # fewer than half
+    assert _velocity(before, view([1, 2], [[0, 2], [10, 2]]), 10.0) is not None
+    assert _velocity(before, None, 10.0) is None
+
+
+class Board:
+    """A film in which a corner moves by 2 pixels a second, and which ends."""
+
+    def __init__(self, path: Path, size) -> None:
+        self.end = {"a": 3.0, "b": 40.0}[path.stem]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error) -> None:
+        pass
+
+    def at(self, time: float):
+        return np.full((2, 2), 2 * time) if time < self.end else None
+
+    @staticmethod
+    def find(grey, time: float = -1.0) -> View:
+        return view([5], [[grey[0, 0], 0.0]], time)
+
+
+@pytest.fixture
+def made(monkeypatch):
+    monkeypatch.setattr(films, "_facts", lambda path: _Facts((2, 2), 25.0, {"a": 3.0, "b": 40.0}[path.stem]))
+    monkeypatch.setattr(films, "Seeker", Board)
+    monkeypatch.setattr(films, "BoardDetector", lambda board: Board)
+
+
+def test_films_are_looked_at_at_the_same_times_of_the_session(made):
+    told = []
+    found = read_films({"a": Path("a.mp4"), "b": Path("b.mp4")}, boards.BOARD, {"a": 1.0, "b": -2.0}, True, lambda: told.append(1))
+    assert len(told) == 2
+    step = max(LEAST_STEP, 42.0 / SAMPLES)
+    for name, start, end in (("a", 1.0, 3.0), ("b", -2.0, 40.0)):
+        film = found[name]
+        np.testing.assert_allclose(film.times, np.arange(0, 42.0, step))
+        for time, each, speed in zip(film.times, film.views, film.velocities):
+            if not 0 <= time + start < end:
+                assert each is None
+                assert speed is None
+                continue
+            assert each is not None
+            assert each.time == time
+            assert each.pixels[0, 0] == pytest.approx(2 * (time + start))
+            if time + start + 1 / 25 < end:
+                np.testing.assert_allclose(speed, [[2, 0]], atol=1e-9)
+            else:
+                assert speed is None
+    alone = read_films({"a": Path("a.mp4")}, boards.BOARD, {}, False)["a"]
+    np.testing.assert_allclose(alone.times, np.arange(0, 3.0, max(LEAST_STEP, 3.0 / SAMPLES)))
+    assert alone.velocities == (None,) * len(alone.times)
