@@ -6,7 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shadowpuppet.errors import LONGEST, FormatError, ShadowPuppetWarning, one_line
+from shadowpuppet.errors import LONGEST, FormatError, ShadowPuppetWarning, one_line, warn
+from shadowpuppet.live.sources import known_person
+from shadowpuppet.pipeline.options import Options
 
 
 @given(st.text(st.characters()))
@@ -27,3 +29,12 @@ def test_the_middle_of_a_long_message_is_left_out():
     assert len(line) < LONGEST + 10
     assert line.startswith("aaa")
     assert line.endswith("b")
+
+
+def test_a_warning_names_the_caller_s_line():
+    """Through any number of functions of the package."""
+    for called in (lambda: warn("a problem"), lambda: known_person(Options())):
+        with pytest.warns(ShadowPuppetWarning) as caught:
+            called()
+        assert caught[0].filename == __file__
+        assert caught[0].lineno == called.__code__.co_firstlineno

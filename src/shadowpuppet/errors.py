@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import stat
+import sys
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -120,3 +122,11 @@ class ShadowPuppetWarning(UserWarning):
     def __str__(self) -> str:
         """The sentence, as that of a `ShadowPuppetError`."""
         return one_line(super().__str__())
+
+
+def warn(message: str) -> None:
+    """Warn of a problem that does not stop the work. The warning names the line that led to it in the caller's own code, not here."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == __name__.partition(".")[0]:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, ShadowPuppetWarning, stacklevel=level)

@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-from warnings import warn
 
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.evaluation.error_metrics import (
     acceleration_errors,
     aligned_errors,
@@ -199,8 +198,7 @@ def _on_our_clock(run: Run, truth: JointTable, how: Comparison, path: str | Path
     if how.sync:
         found = find_offset(motion, truth)
         if found.rival is not None:
-            warn(f"{path}: an offset of {found.rival:.3f} s fits nearly as well as {found.seconds:.3f} s: the motion repeats itself",
-                 ShadowPuppetWarning, stacklevel=4)
+            warn(f"{path}: an offset of {found.rival:.3f} s fits nearly as well as {found.seconds:.3f} s: the motion repeats itself")
     offset = found.seconds if found else how.offset
     moved = replace(truth, times=truth.times + offset)
     if len(motion.times) and (motion.times[-1] < moved.times[0] or motion.times[0] > moved.times[-1]):
@@ -226,7 +224,7 @@ def _in_our_world(run: Run, truth: JointTable, how: Comparison) -> tuple[JointTa
     if world.get("apart"):
         warn(f"the run's joints are {world['mean_mm']:.0f} mm from the truth's, but {world['aligned_mm']:.0f} mm once the run is turned by "
              f"{world['rotation_deg']:.0f} degrees and moved by {np.linalg.norm(world['moved_mm']):.0f} mm as a whole: are they in two "
-             "worlds, or is the distance wrong? --align compares after that", ShadowPuppetWarning, stacklevel=3)
+             "worlds, or is the distance wrong? --align compares after that")
     return truth, world | ({"moved": False} if world else {})
 
 
@@ -241,7 +239,7 @@ def _single_camera(cameras: Sequence[Camera]) -> Camera | None:
 
 def _known_truth(path: object) -> str | None:
     if isinstance(path, str) and not Path(path).exists():
-        warn(f"{path}: the recording's truth is not there any more; give it as TRUTH", ShadowPuppetWarning, stacklevel=3)
+        warn(f"{path}: the recording's truth is not there any more; give it as TRUTH")
         return None
     return path if isinstance(path, str) else None
 

@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
-from warnings import warn
 
 import numpy as np
 
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning, choices, reason
+from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, choices, reason, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.motion import EXPORTS, READABLE
@@ -169,8 +168,7 @@ def _warn_of_channels(source: Path) -> None:
     """Warn of the analog channels of a .c3d file, which are not converted."""
     channels = read_header(source).channels if source.suffix.lower() == ".c3d" else []
     if channels:
-        warn(f"{source}: its {len(channels)} analog channels ({shorten(channels, 60)}) are left out: only points are converted",
-             ShadowPuppetWarning, stacklevel=3)  # fmt: skip
+        warn(f"{source}: its {len(channels)} analog channels ({shorten(channels, 60)}) are left out: only points are converted")
 
 
 def _fitted(source: Path, target: Path, table: JointTable, written: Format, layout: Layout) -> str:
@@ -208,7 +206,7 @@ class _RunExport:
         animation, off = motion_animation(self.body, self.run.motion)
         if off > TOLERANCE:
             warn(f"{self.run.folder}: the joints of the body in person.toml lie up to {1000 * off:.0f} mm off the run's: the person was "
-                 "measured again while it was made", ShadowPuppetWarning, stacklevel=3)  # fmt: skip
+                 "measured again while it was made")  # fmt: skip
         return animation
 
     @cached_property

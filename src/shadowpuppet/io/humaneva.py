@@ -11,11 +11,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, NamedTuple
-from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices
+from shadowpuppet.errors import RecordingError, choices, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.bouguet import read_cal
 from shadowpuppet.io.calibration.calibration_files import write_calibration
@@ -168,7 +167,7 @@ def _films(folder: Path, subject: str, action: str, trial: int) -> dict[str, Pat
         raise RecordingError(f"{person / 'Image_Data'}: found no film of {action}_{trial}, expected one of {choices(there)}")
     if len(films) < len(cameras):
         warn(f"{person / 'Image_Data'}: no film of {choices(set(cameras) - set(films))} for {action}_{trial}; going on with "
-             f"{choices(films)}", ShadowPuppetWarning, stacklevel=4)
+             f"{choices(films)}")
     return films
 
 

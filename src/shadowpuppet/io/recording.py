@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 from itertools import count, takewhile
 from pathlib import Path
 from typing import Any
-from warnings import warn
 
 from shadowpuppet.body.sizes import DISTANCES, HEIGHTS
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, choices, reason
+from shadowpuppet.errors import RecordingError, choices, reason, warn
 from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, read_calibration
 from shadowpuppet.io.calibration.formats import find_calibration
 from shadowpuppet.io.projects import Project, films_in, find_project, sources_in
@@ -149,7 +148,7 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
         _check_names(folder / kind, sources, cameras)
     missing = [c.name for c in cameras if c.name not in films]
     if missing:
-        warn(f"{folder}: no film of {choices(missing)}; going on with {choices(films)}", ShadowPuppetWarning, stacklevel=3)
+        warn(f"{folder}: no film of {choices(missing)}; going on with {choices(films)}")
     starts = _starts(notes, cameras)
     views = tuple(_without_padding(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), starts.get(c.name, 0.0)))
                   for c in cameras if c.name in films)
@@ -170,7 +169,7 @@ def _in_order(cameras: tuple[Camera, ...], films: dict[str, Any], project: Proje
         return cameras
     named = tuple(replace(camera, name=name) for camera, name in zip(cameras, films))
     warn(f"{project.folder}: films and calibration have other names of cameras, and are paired by order, as {project.program} does: "
-         f"{', '.join(f'{film} is {camera.name}' for camera, film in zip(cameras, films))}", ShadowPuppetWarning, stacklevel=4)
+         f"{', '.join(f'{film} is {camera.name}' for camera, film in zip(cameras, films))}")
     return named
 
 
@@ -259,7 +258,7 @@ def _without_padding(view: View) -> View:
     which = ("film", "calibration") if sum(found) > sum(expected) else ("calibration", "film")
     warn(f"{view.video}: found pictures of {found[0]} x {found[1]} pixels, the calibration of camera {view.camera.name!r} is for "
          f"{expected[0]} x {expected[1]}; the {which[0]} has the padding of H.264 at the bottom or right, the {which[1]} has not: points "
-         "stay where they are", ShadowPuppetWarning, stacklevel=4)
+         "stay where they are")
     return replace(view, camera=replace(view.camera, size=found))
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, choices
+from shadowpuppet.errors import CalibrationError, RecordingError, choices, warn
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.live.phases import KEPT
@@ -24,8 +22,8 @@ def lens(options: Options, size: Size) -> Camera:
     """The camera for pictures of `size`, from the options. Raises `CalibrationError` if the calibration does not fit."""
     if options.calibration is None:
         if options.fov is None:
-            _warn(f"no field of view is given: {USUAL_FOV:g} degrees are assumed, and depths are as wrong as that; give --fov or "
-                  "--calibration")
+            warn(f"no field of view is given: {USUAL_FOV:g} degrees are assumed, and depths are as wrong as that; give --fov or "
+                 "--calibration")
         return Camera.from_fov(size, float(np.radians(options.fov or USUAL_FOV)))
     if options.fov is not None:
         raise CalibrationError(f"{options.calibration}: found a field of view and a calibration, expected one of them")
@@ -43,7 +41,7 @@ def known_person(options: Options) -> Person | None:
     """The person in the file `options.person`; None without it. Warns if neither height nor distance is known. Raises `FormatError`."""
     person = read_person(options.person, options.tracker.body) if options.person is not None else None
     if options.height is None and (person is None or person.height is None) and options.distance is None:
-        _warn("neither height nor distance is known: the average height is assumed, and all lengths are as wrong as that; give --height")
+        warn("neither height nor distance is known: the average height is assumed, and all lengths are as wrong as that; give --height")
     return person
 
 
@@ -56,7 +54,3 @@ def empty_scene(options: Options, full: Camera) -> list[Image]:
         raise RecordingError(f"{options.background}: found the empty scene of {size[0]} x {size[1]} pixels, expected {full.size[0]} x "
                              f"{full.size[1]} as the camera's: it must come from the same camera at the same setting")
     return sample_frames((frame.image for frame in open_frames(options.background, size=worked_size(size, options.max_size))), KEPT)
-
-
-def _warn(message: str) -> None:
-    warnings.warn(message, ShadowPuppetWarning, stacklevel=3)

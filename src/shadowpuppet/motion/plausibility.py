@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
 from shadowpuppet.body.skeleton import SIDES
-from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
+from shadowpuppet.errors import ShadowPuppetError, choices, warn
 from shadowpuppet.geometry import Array, unit
 from shadowpuppet.motion.motion import JointTable
 
@@ -65,7 +63,7 @@ def _check_upright(trunk: Array, source: str) -> None:
     if lean < -0.5:
         raise ShadowPuppetError(f"{source}: found the shoulders under the hips most of the time, expected the world's Z up")
     if lean < 0.3:
-        warnings.warn(f"{source}: the trunk lies level most of the time: is the world's Z up?", ShadowPuppetWarning, stacklevel=4)
+        warn(f"{source}: the trunk lies level most of the time: is the world's Z up?")
 
 
 def _check_sides(table: JointTable, trunk: Array, source: str) -> None:

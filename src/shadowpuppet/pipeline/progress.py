@@ -10,13 +10,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
-from warnings import warn
 
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.plain import for_json, plain
 from shadowpuppet.io.files.text import write_whole
@@ -185,8 +184,7 @@ def warn_of_losses(motion: Motion) -> None:
     present = np.count_nonzero(motion.status != "absent")
     if len(lost) > MANY_LOST * present:
         warn(f"the person is lost in {100 * len(lost) / present:.0f} % of the frames, first at {motion.times[lost[0]]:.2f} s: do their "
-             "silhouettes show them, and them alone? --overlay shows it; give a picture of the empty scene, a --region, or better light",
-             ShadowPuppetWarning, stacklevel=3)
+             "silhouettes show them, and them alone? --overlay shows it; give a picture of the empty scene, a --region, or better light")
 
 
 def warn_of_left_out(found: Sequence[Mapping[str, Any]]) -> None:
@@ -195,8 +193,7 @@ def warn_of_left_out(found: Sequence[Mapping[str, Any]]) -> None:
         places = "; ".join(f"camera {one['camera']!r}, {one['frames']} frames from {one['from_s']:.1f} to {one['to_s']:.1f} s, within "
                            "x {} to {}, y {} to {}".format(one["box"][0], one["box"][2], one["box"][1], one["box"][3]) for one in found)
         warn(f"parts of the silhouettes that stayed, and that no pose of the body explains, were left out ({places}): a thing, a shadow or "
-             "another person; if it was the person, give --tracker.patience 0 (with several cameras --multiview.patience 0)",
-             ShadowPuppetWarning, stacklevel=3)
+             "another person; if it was the person, give --tracker.patience 0 (with several cameras --multiview.patience 0)")
 
 
 def set_aside(intervals: Iterable[Interval], names: Sequence[str]) -> dict[str, Any]:
@@ -212,8 +209,7 @@ def warn_of_set_aside(found: Sequence[Mapping[str, Any]]) -> None:
         when = "; ".join(f"camera {one['camera']!r}, {one['why']} from {one['from_s']:.1f} to {one['to_s']:.1f} s" for one in found)
         warn(f"cameras were set aside for a time ({when}): frozen is a picture that does not change while the person moves in others, "
              "blind one of which nearly all is silhouette, as when it turns black; late or early one that shows what the others showed, or "
-             "will show, at another time: are its frames complete, and is its start in recording.toml right?",
-             ShadowPuppetWarning, stacklevel=3)
+             "will show, at another time: are its frames complete, and is its start in recording.toml right?")
 
 
 def evaluated(rig: Rig, motion: Motion) -> dict[str, Any]:
@@ -225,5 +221,5 @@ def evaluated(rig: Rig, motion: Motion) -> dict[str, Any]:
             truth = truth.between(rig.recording.begin, np.inf if rig.recording.duration is None else rig.recording.duration)
         return evaluate(motion, truth, camera=camera, cameras=cameras)
     except ShadowPuppetError as error:  # the run is complete: a bad truth file must not discard it
-        warn(f"no errors are computed: {error}", ShadowPuppetWarning, stacklevel=2)
+        warn(f"no errors are computed: {error}")
         return evaluate(motion, camera=camera, cameras=cameras)

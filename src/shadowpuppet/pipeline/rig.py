@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-import warnings
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import NamedTuple
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.errors import SettingsError, ShadowPuppetWarning, SilhouetteError, VideoError
+from shadowpuppet.errors import SettingsError, SilhouetteError, VideoError, warn
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage, chosen_views, open_recording
 from shadowpuppet.pipeline.options import Options
@@ -238,5 +237,4 @@ def _warn_of_ends(readers: Sequence[CameraReader], moment: float, step: float) -
         if reader.next is None and not reader.warned and (reader.trouble or moment > reader.last + LATE * step):
             reader.warned = True
             ends = reader.trouble or f"{reader.footage.view.video}: ends at {max(reader.last, 0.0):.2f} s"
-            warnings.warn(f"{ends}; from there on the run goes on without camera {reader.footage.camera.name!r}", ShadowPuppetWarning,
-                          stacklevel=3)
+            warn(f"{ends}; from there on the run goes on without camera {reader.footage.camera.name!r}")

@@ -9,11 +9,10 @@ from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
-from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
+from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError, warn
 from shadowpuppet.io.people import person_folder
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import read_run
@@ -264,7 +263,7 @@ def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]]
     try:
         found = smoothed_parts(motion, parts, np.full(len(motion), np.nan) if leans is None else np.array(leans))
     except (SettingsError, np.linalg.LinAlgError) as error:
-        warn(f"the motion is not smoothed: {error}", ShadowPuppetWarning, stacklevel=3)
+        warn(f"the motion is not smoothed: {error}")
         writer.info["smoothing"] = {"method": "off"}
         return
     turned = found.motion.times[1:][np.diff(found.mirrored.astype(int)) != 0]
@@ -272,7 +271,7 @@ def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]]
         first, other = ("looked away", "camera") if away else ("faced the camera", "away")
         warn(f"the person seems to have turned round at {', '.join(f'{time:.1f}' for time in turned)} s: left and right are exchanged from "
              f"there on, which one camera cannot see, nor that they {first} at first, as was assumed (--facing {other} if not); --smooth "
-             "off leaves them as tracked", ShadowPuppetWarning, stacklevel=3)
+             "off leaves them as tracked")
     writer.revise(found.motion)
     counts = {"bridged_frames": found.bridged, "turned_frames": found.mirrored, "reversed_frames": found.reversed}
     writer.info["smoothing"] = {**parts[0][1].summary, **{name: int(frames.sum()) for name, frames in counts.items()}}

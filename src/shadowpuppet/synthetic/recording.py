@@ -7,12 +7,11 @@ from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
-from warnings import warn
 
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning
+from shadowpuppet.errors import RecordingError, SettingsError, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.faults.camera_faults import CameraFaults
 from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEAD_SECONDS, LEVEL, TAIL_SECONDS, posture, trunk
@@ -65,11 +64,11 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
         hides, seen = _shoot(folder, spec, studio, figure, _part(tell, n * len(times), len(cameras) * len(times)))
         hidden += hides
         if not seen:
-            warn(f"{folder}: camera {camera.name!r}: sees nothing of the person in any picture", ShadowPuppetWarning, stacklevel=2)
+            warn(f"{folder}: camera {camera.name!r}: sees nothing of the person in any picture")
         if len(cameras) == 1:
             _write_references(folder / "references", spec, studio)
     if not (hidden or all(thing.seat for thing in spec.scene.obstacles)):
-        warn(f"{folder}: obstacles: nothing of the person is hidden by them in any picture", ShadowPuppetWarning, stacklevel=2)
+        warn(f"{folder}: obstacles: nothing of the person is hidden by them in any picture")
     return folder
 
 

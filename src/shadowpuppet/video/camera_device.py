@@ -5,14 +5,13 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError
+from shadowpuppet.errors import VideoError, warn
 from shadowpuppet.video.frames import Frame, FrameSource, Image, Wanted, check_size, size_of
 
 if TYPE_CHECKING:
@@ -95,4 +94,4 @@ def _frames(capture: VideoCapture, number: int, grey: bool, size: tuple[int, int
         check_size(f"camera {number}", n, now - start, image, size)
         yield Frame(now - start, image)
         n += 1
-    warnings.warn(f"camera {number}: gave no more pictures after {n}", ShadowPuppetWarning, stacklevel=2)
+    warn(f"camera {number}: gave no more pictures after {n}")

@@ -5,14 +5,13 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError, check_regular, reason
+from shadowpuppet.errors import VideoError, check_regular, reason, warn
 from shadowpuppet.threads import thread_limit
 from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, Wanted, check_size, size_of
 
@@ -77,7 +76,7 @@ def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float 
                 before, time = clock.last, clock(frame)
                 shown = n / rate if rate else time
                 if n > 10 and longest < 1.1 * step + 0.001 and time - before > 1.5 * step:  # steady so far, to the millisecond
-                    _say(f"{path}: between {before:.3f} and {time:.3f} s frames are missing")
+                    warn(f"{path}: between {before:.3f} and {time:.3f} s frames are missing")
                 if wanted(shown):
                     image = convert(frame)
                     check_size(path, n, shown, image, film.size)
@@ -89,11 +88,7 @@ def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float 
         broken = f"the file ends, {film.duration:.3f} s were announced"
     if broken:
         of = f" of {film.count}" if film.count else ""
-        _say(f"{path}: broken off at frame {n}{of} ({clock.last + step:.3f} s): {broken}; the {n} frames before it are given")
-
-
-def _say(warning: str) -> None:
-    warnings.warn(warning, ShadowPuppetWarning, stacklevel=3)
+        warn(f"{path}: broken off at frame {n}{of} ({clock.last + step:.3f} s): {broken}; the {n} frames before it are given")
 
 
 def _declared_duration(container: InputContainer, stream: VideoStream) -> float:
@@ -214,7 +209,7 @@ class _Clock:
 
     def _warn(self, time: float, what: str) -> None:
         if not self.warned:
-            _say(f"{self.path}: the frame at {time:.3f} s {what}")
+            warn(f"{self.path}: the frame at {time:.3f} s {what}")
         self.warned = True
 
 

@@ -6,14 +6,13 @@ import contextlib
 import math
 import os
 import re
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError, check_regular, choices, reason
+from shadowpuppet.errors import VideoError, check_regular, choices, reason, warn
 from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, Wanted, check_size, size_of
 
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
@@ -80,8 +79,7 @@ def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:
 
     def read(wanted: Wanted) -> Iterator[Frame]:
         if assumed:
-            warnings.warn(f"{folder}: no timestamps.txt in it and no rate given: {ASSUMED_RATE:g} frames/s are assumed",
-                          ShadowPuppetWarning, stacklevel=2)
+            warn(f"{folder}: no timestamps.txt in it and no rate given: {ASSUMED_RATE:g} frames/s are assumed")
         for i, (time, path) in enumerate(zip(times.tolist(), paths)):
             if not wanted(time):
                 continue

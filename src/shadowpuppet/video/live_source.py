@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 import re
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from shadowpuppet.errors import SettingsError, ShadowPuppetWarning, VideoError
+from shadowpuppet.errors import SettingsError, VideoError, warn
 from shadowpuppet.video import IMAGE_SUFFIXES, FrameSource, Image, Size, camera_number, open_frames
 from shadowpuppet.video.camera_device import open_device, pictures
 from shadowpuppet.video.film import tells_times
@@ -121,8 +120,7 @@ def film_feed(film: FrameSource, speed: float = 1.0, clock: Callable[[], float] 
             if -ahead > MAX_DELAY:  # too slow: set the clock back
                 start, due = start - ahead, due - ahead
                 if not warned:
-                    warnings.warn(f"{film.name}: cannot be decoded as fast as it is to be played; it is played slower", ShadowPuppetWarning,
-                                  stacklevel=2)
+                    warn(f"{film.name}: cannot be decoded as fast as it is to be played; it is played slower")
                 warned = True
             yield Snapshot(due, image, time_)
 

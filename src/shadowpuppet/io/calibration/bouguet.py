@@ -4,12 +4,11 @@ sizes."""
 from __future__ import annotations
 
 from pathlib import Path
-from warnings import warn
 
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import CalibrationError, ShadowPuppetWarning
+from shadowpuppet.errors import CalibrationError, warn
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.draft import Draft, Drafts, text_of
 
@@ -48,7 +47,6 @@ def draft_of(path: Path, name: str, size: tuple[int, int] | None = None) -> Draf
     if skew > 1:
         raise CalibrationError(f"{path}: alpha: found {alpha[0]:g}, a skew of up to {skew:.4g} pixels, expected none")
     if skew > 0.01:
-        warn(f"{path}: alpha: found {alpha[0]:g}, a skew, which cameras have not here: left out, up to {skew:.2f} pixels",
-             ShadowPuppetWarning, stacklevel=3)
+        warn(f"{path}: alpha: found {alpha[0]:g}, a skew, which cameras have not here: left out, up to {skew:.2f} pixels")
     matrix = np.array([[fc[0], 0, cc[0]], [0, fc[1], cc[1]], [0, 0, 1]])
     return Draft(name, matrix, kc, rigid(R.reshape(3, 3), T), size)

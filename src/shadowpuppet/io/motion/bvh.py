@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import NoReturn
-from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetWarning
+from shadowpuppet.errors import FormatError, warn
 from shadowpuppet.geometry import Array, rotation_about
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import errors_named, read_text
@@ -219,8 +218,7 @@ def _header(path: Path, lines: list[str], motion: int) -> tuple[float, int]:
         header[key] = float(value[0])
     frames = sum(bool(line.strip()) for line in lines[n + 1 :])
     if frames and frames != header["Frames:"]:
-        warn(f"{path}: line {n}, Frames: found {header['Frames:']:g}, but the file has {frames}; those are used", ShadowPuppetWarning,
-             stacklevel=4)
+        warn(f"{path}: line {n}, Frames: found {header['Frames:']:g}, but the file has {frames}; those are used")
     return header["Frame Time:"], n + 1
 
 
@@ -228,8 +226,7 @@ def _values(path: Path, lines: list[str], first: int, width: int) -> Array:
     """Channel values (T, width) of the lines from index `first` on, one frame per line; an incomplete last line is left out."""
     rows = [(n, line.split()) for n, line in enumerate(lines[first:], first + 1) if line.strip()]
     if len(rows) > 1 and len(rows[-1][1]) < width:
-        warn(f"{path}: line {rows[-1][0]}: the file breaks off within a frame; the {len(rows) - 1} before it are used",
-             ShadowPuppetWarning, stacklevel=4)
+        warn(f"{path}: line {rows[-1][0]}: the file breaks off within a frame; the {len(rows) - 1} before it are used")
         rows.pop()
     if not rows or not width:
         raise FormatError(f"{path}: found {len(rows)} frames of {width} channels, expected a motion")

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
+from shadowpuppet.errors import ShadowPuppetError, choices, warn
 from shadowpuppet.geometry import Array, clear_order, continuous_angles
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import write_whole
@@ -41,8 +40,7 @@ def write_bvh(path: str | Path, animation: Animation, unit: str = "m") -> None:
     rate, animation = at_constant_rate(path, animation)
     animation, off = constant_bones(animation)
     if off > STILL:
-        warn(f"{path}: joints lie up to {1000 * off:.1f} mm off, as bones keep their lengths in this format", ShadowPuppetWarning,
-             stacklevel=2)
+        warn(f"{path}: joints lie up to {1000 * off:.1f} mm off, as bones keep their lengths in this format")
     turns = animation.rotations.copy()
     turns[:, 0] = Y_UP @ turns[:, 0]
     order, axes = _depth_first(animation), clear_order(turns.reshape(-1, 3, 3))
@@ -61,12 +59,11 @@ def at_constant_rate(path: Path, animation: Animation) -> tuple[float, Animation
     except ShadowPuppetError as error:
         raise ShadowPuppetError(f"{path}: {error}") from None
     if grid.frames is None:
-        warn(f"{path}: the frames do not come at a constant rate, which this format needs; they were resampled at {grid.rate:g} frames/s",
-             ShadowPuppetWarning, stacklevel=3)  # fmt: skip
+        warn(f"{path}: the frames do not come at a constant rate, which this format needs; they were resampled at {grid.rate:g} frames/s")
     unknown = int((~animation.known).sum()) + (0 if grid.frames is None else int((grid.frames < 0).sum()))
     if unknown:
         warn(f"{path}: {unknown} of {len(grid.times)} frames are not known, which this format cannot tell: the person is moved on evenly "
-             "from the frame before to the one after", ShadowPuppetWarning, stacklevel=3)  # fmt: skip
+             "from the frame before to the one after")  # fmt: skip
     return grid.rate, made
 
 

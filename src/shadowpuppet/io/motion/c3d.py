@@ -10,12 +10,11 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import FormatError, ShadowPuppetWarning, check_regular, choices, reason
+from shadowpuppet.errors import FormatError, check_regular, choices, reason, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import errors_named
@@ -142,7 +141,7 @@ def _header(path: Path, size: int, head: bytes, parameters: dict[str, Any], proc
     start, width = (block - 1) * BYTES, (4 * points + analog) * (4 if scale < 0 else 2)
     stated, there = _stated_frames(known, first, last), max(size - start, 0) // width
     if there < stated:
-        warn(f"{path}: found {there} frames, but it tells of {stated}; those are used", ShadowPuppetWarning, stacklevel=5)
+        warn(f"{path}: found {there} frames, but it tells of {stated}; those are used")
     if not min(stated, there):
         raise FormatError(f"{path}: found no frame of {points} points from byte {start} on, expected a motion")
     begins = _fields(known, "START") or first
@@ -185,7 +184,7 @@ def _points(header: C3d, chosen: list[int]) -> tuple[Array, NDArray[np.bool_]]:
 def _metres(header: C3d) -> float:
     unit = "".join(header.words("POINT:UNITS")[:1]).lower()
     if not unit:
-        warn(f"{header.path}: POINT:UNITS: found none, millimetres are taken", ShadowPuppetWarning, stacklevel=4)
+        warn(f"{header.path}: POINT:UNITS: found none, millimetres are taken")
     if (unit or "mm") not in METRES:
         raise FormatError(f"{header.path}: POINT:UNITS: found {shorten([unit])!r}, expected one of {choices(METRES)}")
     return METRES[unit or "mm"]

@@ -5,12 +5,11 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import write_whole
@@ -87,8 +86,7 @@ def _at_constant_rate(path: Path, times: Array, values: Array) -> tuple[float, A
         raise ShadowPuppetError(f"{path}: {error}") from None
     if grid.frames is not None:
         return grid.rate, np.where((grid.frames >= 0)[:, None], values[np.maximum(grid.frames, 0)], np.nan)
-    warn(f"{path}: the frames do not come at a constant rate, which this format needs; they were resampled at {grid.rate:g} frames/s",
-         ShadowPuppetWarning, stacklevel=3)  # fmt: skip
+    warn(f"{path}: the frames do not come at a constant rate, which this format needs; they were resampled at {grid.rate:g} frames/s")
     return grid.rate, resample(times, values, grid.rate)[1]
 
 

@@ -6,12 +6,11 @@ import json
 import struct
 from pathlib import Path
 from typing import Any
-from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.motion.animation import Y_UP, Animation
@@ -38,8 +37,7 @@ def write_glb(path: str | Path, animation: Animation, mesh: Mesh, smoothing: str
         raise ShadowPuppetError(f"{path}: found no frame in which the whole skeleton is known, expected one at least")
     gaps = len(animation.times) - len(known)
     if gaps:
-        warn(f"{path}: {gaps} of {len(animation.times)} frames are not known: the puppet is hidden in them", ShadowPuppetWarning,
-             stacklevel=2)
+        warn(f"{path}: {gaps} of {len(animation.times)} frames are not known: the puppet is hidden in them")
     buffer = _Buffer()
     primitive = _primitive(buffer, mesh)
     skin = buffer.add(_inverse_bind(animation), "MAT4", FLOAT)

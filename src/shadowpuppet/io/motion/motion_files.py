@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
+from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.motion import READABLE
@@ -139,7 +138,7 @@ def unit_of(path: Path, table: JointTable) -> float:
     for unit, (low, high, metres) in LEG_LENGTHS.items():
         if low <= length < high:
             if metres != 1:
-                warn(f"{path}: BVH files do not tell their unit; legs {length:.4g} long make it {unit}", ShadowPuppetWarning, stacklevel=3)
+                warn(f"{path}: BVH files do not tell their unit; legs {length:.4g} long make it {unit}")
             return metres
     raise FormatError(f"{path}: found legs {length:.4g} long in an unknown unit, expected a person's in metres, centimetres, millimetres "
                       "or inches; --source-unit gives another")
@@ -164,7 +163,7 @@ def rotation_to_z_up(path: Path, table: JointTable) -> Array:
     axis = up_axis(_known(table))
     if axis not in TO_Z_UP:
         return np.eye(3)
-    warn(f"{path}: {axis.upper()} points up there; turned so that Z does", ShadowPuppetWarning, stacklevel=3)
+    warn(f"{path}: {axis.upper()} points up there; turned so that Z does")
     return np.array(TO_Z_UP[axis], float)
 
 
@@ -172,8 +171,7 @@ def _markers_up(path: Path, table: JointTable) -> Array:
     """As `rotation_to_z_up`, for all markers of a .trc file: if no legs and head have known names, Y is up, as OpenSim requires."""
     if np.isfinite(_upward(_known(table))).any():
         return rotation_to_z_up(path, table)
-    warn(f"{path}: found no legs and head of known names that show which axis is up: Y is taken, as in OpenSim, and turned to Z",
-         ShadowPuppetWarning, stacklevel=3)  # fmt: skip
+    warn(f"{path}: found no legs and head of known names that show which axis is up: Y is taken, as in OpenSim, and turned to Z")
     return np.array(TO_Z_UP["+y"], float)
 
 

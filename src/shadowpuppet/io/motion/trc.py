@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, choices
+from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, warn
 from shadowpuppet.io.files.table import cells, check_times, number, shorten
 from shadowpuppet.io.files.text import errors_named, read_text, write_whole
 from shadowpuppet.motion.motion import JointTable
@@ -134,8 +133,7 @@ def _row(path: Path, line: int, columns: list[str], row: list[str]) -> list[floa
 def _check_count(path: Path, header: dict[str, str], count: int) -> None:
     said = header.get("NumFrames", "")
     if said != str(count):
-        warn(f"{path}: line 3, NumFrames: found {said!r}, but the file has {count} frames; those are used", ShadowPuppetWarning,
-             stacklevel=3)
+        warn(f"{path}: line 3, NumFrames: found {said!r}, but the file has {count} frames; those are used")
 
 
 def _rate(table: JointTable) -> str:

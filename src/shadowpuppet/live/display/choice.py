@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
-
-from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
+from shadowpuppet.errors import SettingsError, warn
 from shadowpuppet.live.display.view import Display
 
 FOOTERS = {
@@ -27,6 +25,5 @@ def open_display(show: str, listen: str = "127.0.0.1", port: int | None = None, 
 
     display = WebDisplay(listen, port, FOOTERS[record], opening=show == "auto")
     if not is_loopback(listen):
-        warnings.warn(f"the page is served at {listen}: everybody who reaches this machine can see the person there, and press the buttons",
-                      ShadowPuppetWarning, stacklevel=2)
+        warn(f"the page is served at {listen}: everybody who reaches this machine can see the person there, and press the buttons")
     return display

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from contextlib import ExitStack
 
-from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.errors import warn
 from shadowpuppet.live.stream.outlet import Outlet, Outlets
 from shadowpuppet.live.stream.settings import OutletSettings
 from shadowpuppet.network import host_and_port, is_loopback
@@ -25,7 +24,7 @@ def _osc(settings: OutletSettings) -> Outlet:
 
     outlet = VmcOutlet(*host_and_port(settings.osc or "", "osc"))
     if not outlet.loopback:
-        _warn(f"the person's joints are sent to {outlet.address}, unencrypted")
+        warn(f"the person's joints are sent to {outlet.address}, unencrypted")
     return outlet
 
 
@@ -35,7 +34,7 @@ def _websocket(settings: OutletSettings) -> Outlet:
     host, port = host_and_port(settings.websocket or "", "websocket")
     outlet = WebSocketOutlet(host, port, [origin.strip() for origin in (settings.origin or "").split(",")])
     if not is_loopback(host):
-        _warn(f"the person's joints are served at {host}: everybody who reaches this machine can have them")
+        warn(f"the person's joints are served at {host}: everybody who reaches this machine can have them")
     return outlet
 
 
@@ -44,15 +43,11 @@ def _lsl(settings: OutletSettings) -> Outlet:
 
     outlet = LslOutlet(settings.lsl or "", settings.lsl_scope)
     if settings.lsl_scope == "machine":
-        _warn("the lab streaming layer listens in all networks of this machine: the stream is announced on this machine alone, but who "
-              "knows its port can have the person's joints")
+        warn("the lab streaming layer listens in all networks of this machine: the stream is announced on this machine alone, but who "
+             "knows its port can have the person's joints")
     else:
-        _warn("the lab streaming layer announces the person's joints in the network, to everybody in it")
+        warn("the lab streaming layer announces the person's joints in the network, to everybody in it")
     return outlet
-
-
-def _warn(message: str) -> None:
-    warnings.warn(message, ShadowPuppetWarning, stacklevel=4)
 
 
 OPENERS: dict[str, Callable[[OutletSettings], Outlet]] = {"osc": _osc, "lsl": _lsl, "websocket": _websocket}

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
-from warnings import warn
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.body.whole_body import GLOBAL_DOFS
-from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, choices
+from shadowpuppet.errors import ShadowPuppetError, choices, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import resample, resample_table
 from shadowpuppet.motion.inverse_kinematics import FittedPoses, fit_poses
@@ -151,7 +150,7 @@ def _check_fit(name: str, fitted: FittedPoses) -> None:
     said = f"{name}: joints lie {1000 * residual:.0f} mm off the body on average, {worst} {1000 * fitted.by_joint[worst]:.0f} mm"
     if residual >= WRONG_RESIDUAL:
         raise ShadowPuppetError(f"{said}, expected a person with the body's joints, whose bones keep their lengths")
-    warn(f"{said}: are its joints those of the body?", ShadowPuppetWarning, stacklevel=4)
+    warn(f"{said}: are its joints those of the body?")
 
 
 def _same_turn(parts: list[Array], skeleton: Skeleton) -> list[Array]:
@@ -167,5 +166,5 @@ def _same_turn(parts: list[Array], skeleton: Skeleton) -> list[Array]:
 
 def _check_moves(clips: Sequence[Array], names: str) -> None:
     if float(np.sqrt(np.concatenate(clips).var(0).mean())) < MIN_MOTION:
-        warn(f"{names}: nobody moves there, so that the prior knows one posture only", ShadowPuppetWarning, stacklevel=3)
+        warn(f"{names}: nobody moves there, so that the prior knows one posture only")
 

@@ -8,13 +8,12 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
-from warnings import warn
 
 import numpy as np
 
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.rasterize import Bits
-from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
+from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError, warn
 from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.people import PEOPLE, person_folder, write_header, write_place
 from shadowpuppet.io.run import read_run
@@ -227,7 +226,7 @@ def _read(path: Path) -> tuple[Path, JointTable] | None:
     try:
         return path, read_truth(path)
     except ShadowPuppetError as error:
-        warn(f"{path}: no errors are computed: {error}", ShadowPuppetWarning, stacklevel=2)
+        warn(f"{path}: no errors are computed: {error}")
         return None
 
 

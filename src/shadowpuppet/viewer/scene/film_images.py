@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.errors import ShadowPuppetWarning, SilhouetteError, VideoError
+from shadowpuppet.errors import SilhouetteError, VideoError, warn
 from shadowpuppet.pipeline.footage import LOOKED_AT, CameraFrame, Footage, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.silhouettes import Silhouettes, uncluttered_silhouettes
@@ -59,7 +58,7 @@ class FilmImages:
             return self._mask(time)
         except (SilhouetteError, VideoError) as error:
             self.trouble = str(error)
-            warnings.warn(f"camera {self.footage.camera.name!r}: no silhouettes are shown: {error}", ShadowPuppetWarning, stacklevel=2)
+            warn(f"camera {self.footage.camera.name!r}: no silhouettes are shown: {error}")
             return None
 
     def _mask(self, time: float) -> Mask | None:

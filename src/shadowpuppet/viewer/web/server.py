@@ -8,12 +8,11 @@ import gc
 import io
 import socket
 import threading
-import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.network import (
     MAX_CONNECTIONS,
     REQUEST_SECONDS,
@@ -72,8 +71,7 @@ def open_server(listen: str = "127.0.0.1", port: int | None = None) -> viser.Vis
                 "it was taken just now" if installed() else f"this version of viser, {viser.__version__}, cannot be kept from other sites"))
     server.request_share_url = lambda verbose=True: None  # disables viser's public share links
     if not is_loopback(listen):
-        warnings.warn(f"the page is served at {listen}: everybody who reaches this machine can see what it shows", ShadowPuppetWarning,
-                      stacklevel=2)
+        warn(f"the page is served at {listen}: everybody who reaches this machine can see what it shows")
     return server
 
 

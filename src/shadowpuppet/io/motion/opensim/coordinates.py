@@ -6,12 +6,11 @@ The models' worlds and bodies have X forward, Y up, Z to the right; ball joints 
 from __future__ import annotations
 
 from typing import Literal, NamedTuple
-from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.geometry import Array, continuous_angles, rotation_about
 from shadowpuppet.motion.animation import Y_UP, Animation
 
@@ -147,13 +146,12 @@ def _face_forward(found: dict[str, Array], limit: float, model: str) -> None:
     turn, clamp = -float(heading.min() + heading.max()) / 2, f"{model!r} clamps pelvis_rotation at {np.degrees(limit):.0f} degrees"
     if np.ptp(heading) > 2 * limit:
         warn(f"MOT: pelvis_rotation runs from {np.degrees(heading.min()):.0f} to {np.degrees(heading.max()):.0f} degrees; {clamp}: "
-             "clear `clamped` of that coordinate in the model", ShadowPuppetWarning, stacklevel=3)  # fmt: skip
+             "clear `clamped` of that coordinate in the model")  # fmt: skip
         return
     found["pelvis_rotation"] = heading + turn
     places = np.stack([found[name] for name in PELVIS_POSITION], 1) @ rotation_about(np.array([0.0, 1, 0]), turn).T
     found |= dict(zip(PELVIS_POSITION, places.T))
-    warn(f"MOT: the world is rotated by {np.degrees(turn):.0f} degrees about the vertical, since {clamp}", ShadowPuppetWarning,
-         stacklevel=3)  # fmt: skip
+    warn(f"MOT: the world is rotated by {np.degrees(turn):.0f} degrees about the vertical, since {clamp}")
 
 
 def _angles(rotations: Array, part: Ball) -> Array:

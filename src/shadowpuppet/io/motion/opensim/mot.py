@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
-from warnings import warn
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
+from shadowpuppet.errors import FormatError, ShadowPuppetError, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import check_times, number, shorten
 from shadowpuppet.io.files.text import read_text, write_whole
@@ -66,8 +65,7 @@ def read_mot(path: str | Path) -> Coordinates:
     table = table.reshape(-1, len(columns))
     check_times(path, table[:, 0], [n for n, _ in numbered])
     if header.get("nRows", str(len(table))).strip() != str(len(table)):
-        warn(f"{path}: nRows: found {header['nRows']}, but the file has {len(table)} rows; those are used", ShadowPuppetWarning,
-             stacklevel=2)
+        warn(f"{path}: nRows: found {header['nRows']}, but the file has {len(table)} rows; those are used")
     angle = np.pi / 180 if header.get("inDegrees", "no").strip().lower() == "yes" else 1.0
     values = zip(columns[1:], table.T[1:])
     return Coordinates(table[:, 0], {name: column * (1.0 if name.endswith(TRANSLATIONS) else angle) for name, column in values})
