@@ -9,7 +9,7 @@ import pytest
 from shadowpuppet.cli import batch_terminal
 from shadowpuppet.cli.batch_terminal import LINES, BatchTerminal, _clock, _pace
 from shadowpuppet.cli.look_tables import _camera_table, _film, _quality, _rig_person, _rig_table
-from shadowpuppet.cli.tables import error_table, metrics_table, people_table, show, verdict_table
+from shadowpuppet.cli.tables import error_table, files_in, metrics_table, people_table, show, verdict_table
 from shadowpuppet.cli.terminal import Terminal
 
 
@@ -129,6 +129,12 @@ def test_verdicts(printed):
     assert verdict("good", "it is dark", "it is far") == ["verdict good", "but it is dark", "it is far"]
     assert verdict("bad", "it is dark") == ["verdict bad", "because it is dark"]
     assert verdict("good") == ["verdict good"]
+
+
+def test_files_that_are_there_are_named(tmp_path):
+    for name in ("b.csv", "c.mp4"):
+        (tmp_path / name).touch()
+    assert files_in(tmp_path, "a.csv", "b.csv", "c.mp4") == ("made", f"{tmp_path / 'b.csv'}\n{tmp_path / 'c.mp4'}")
 
 
 def test_parts_stand_apart(printed):

@@ -113,6 +113,7 @@ def test_tables():
         ["", "rmse"], ["left hip", "4.4"], ["all", "5.5"],
         ["", "run less truth", "mean size", "rmse"], ["left knee flexion", "+1.0", "2.0", "3.0"],
     ]  # fmt: skip
+    assert re.findall(r"<tr class=sum><td>(.*?)</td>", body) == ["all"]
     assert rows([("a",), ("b",), ("c",)], sums=1) == "<tr><td>a</td></tr><tr><td>b</td></tr><tr class=sum><td>c</td></tr>"
 
 

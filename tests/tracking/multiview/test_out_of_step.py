@@ -121,6 +121,14 @@ def test_evidence_is_that_of_plain_loops(seed):
     assert watch._seen[0].seconds >= watch._seen[-1].seconds - LAGS[-1] - PACE
 
 
+def test_frames_that_come_faster_than_the_pace_are_left_out():
+    watch = StepWatch(2)
+    for n in range(50, 58):
+        watch(n / 60, [person(n)] * 2)
+        watch.tracked((pack(person(n)[::2, ::2]),) * 2)
+    assert [round(60 * seen.seconds) for seen in watch._seen] == [50, 52, 54, 56]
+
+
 def verdict(gain, cameras: int = 4, change=1.0, misfit=0.0, out=()) -> tuple[str, ...]:
     """Of made sums; `gain`: by (camera, lag). A body of the other moment's opposite explains nothing."""
     watch = StepWatch(cameras)
