@@ -19,7 +19,7 @@ def view(ids, pixels, time: float = 0.0) -> View:
 
 
 def test_films_pictures_and_folders_of_pictures_are_named_by_their_cameras(tmp_path):
-    for name in ("a.mp4", "b.jpg", "c/1.png", "empty/note.txt", "note.txt", ".hidden.mp4"):
+    for name in ("a.mp4", "b.jpg", "c/1.png", "c/note.txt", "empty/note.txt", "note.txt", ".hidden.mp4"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).touch()
     assert films_in(tmp_path) == {"a": tmp_path / "a.mp4", "b": tmp_path / "b.jpg", "c": tmp_path / "c"}

@@ -171,3 +171,14 @@ def test_nothing_known_is_said(tmp_path, rng):
     with pytest.raises(ShadowPuppetError, match=r"a\.glb: found no frame in which the whole skeleton is known"):
         write_glb(tmp_path / "a.glb", replace(animation, rotations=animation.rotations * np.nan), bone_mesh(animation))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_bounds_that_are_stated_are_those_of_the_numbers(tmp_path, rng):
+    """Viewers draw nothing of what they take to lie outside of the picture."""
+    write_glb(tmp_path / "a.glb", animated("anatomical", rng), body_mesh(runs.body_of("anatomical")))
+    scene = Scene(tmp_path / "a.glb")
+    stated = [(n, accessor) for n, accessor in enumerate(scene.file.accessors) if accessor.min]
+    assert len(stated) >= 2  # points of the skin, times
+    for n, accessor in stated:
+        values = scene.array(n)
+        np.testing.assert_allclose([accessor.min, accessor.max], [values.min(0), values.max(0)], rtol=1e-6)
