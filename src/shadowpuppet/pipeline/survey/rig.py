@@ -24,6 +24,7 @@ from shadowpuppet.pipeline.survey.cautions import GOOD, clutter_cautions, condit
 from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, survey_film
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import usable_cores
+from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 
 OPENING, OPENED = 2.0, 40
 """With several cameras: duration (s) of the beginning in which the person is measured, and the greatest number of frame sets kept of it."""
@@ -75,7 +76,8 @@ def _first_sets(rig: Rig, silhouettes: Sequence[Silhouettes], ready: bool) -> Fi
     every = max(1, round(OPENING * rig.rate / OPENED))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when the run comes to it
-        frames = synchronized_frames(rig, silhouettes, ready=ready, every=every, threads=usable_cores())
+        frames = synchronized_frames(rig, [each.segmented for each in silhouettes], ready=ready, every=every, threads=usable_cores(),
+                                     share=SharedShadows(rig.cameras))
         sets = [(each.time, each.masks) for each in islice(frames, OPENED)]
     sets = [each for each in sets if each[0] <= OPENING] or sets[:1]
     return FirstSeconds([time for time, _ in sets], [masks for _, masks in sets])
@@ -99,7 +101,7 @@ def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
 
 
 def _rig_doubts(look: RigLook, several: bool = False, recovered: bool = False) -> list[Caution]:
-    """Doubts about a rig; of `several` people the quality of silhouettes, which supposes one, says nothing, and silhouettes against an empty
+    """Doubts about a rig; of `several` people the quality of silhouettes, which supposes one, says nothing; silhouettes against an empty
     scene that was `recovered` from the film may themselves be why the cameras do not fit together."""
     unclear = recovered and look.agreement.remedy is None
     doubts = [Caution(doubt, SILHOUETTES_OR_CAMERAS, RUINOUS) if unclear and doubt.weight == RUINOUS else doubt
