@@ -115,3 +115,12 @@ def test_earlier_findings_stay():
 def test_described_in_the_films_pixels(scale):
     text = AddedParts(np.zeros((*SIZE, 3), np.uint8), CHAIR).described(scale)
     assert f"x {round(32 * scale[0])} to {round(50 * scale[0])}, y {round(16 * scale[1])} to {round(44 * scale[1])}" in text
+
+
+@pytest.mark.parametrize(("frames", "told"), [(8, True), (7, False)])
+def test_eight_frames_tell_that_nothing_moves(frames, told):
+    images, masks = film(frames=12, person=False)
+    still = find_still(images, masks)
+    assert (find_nobody(still, masks[:frames]) is not None) == told
+    empty = [np.zeros(SIZE, bool)] * 5  # count for nothing
+    assert (find_nobody(still, [*masks[:frames], *empty]) is not None) == told
