@@ -11,7 +11,7 @@ import pytest
 
 from shadowpuppet.calibration import session as sessions
 from shadowpuppet.calibration.boards.detection import View
-from shadowpuppet.calibration.boards.films import BoardFilm, view_at_rest
+from shadowpuppet.calibration.boards.films import BoardFilm
 from shadowpuppet.calibration.session import _bad_fit, _narrow, _placed, delays_of, place_advice
 from shadowpuppet.errors import CalibrationError
 
@@ -61,22 +61,6 @@ def test_a_camera_without_a_film_is_named(given):
     _, floor, _, notes = given({"a": film(view(), rate=0.0)}, {"b": film(None)})
     assert floor is None
     assert notes[0] == "no camera finds the board in floor/: the floor is unknown"
-
-
-def test_a_board_at_rest_is_the_median_of_its_views():
-    views = [view(3.0, 1.0), view(4.0, 2.0), view(5.0, 9.0, range(20))]
-    found = view_at_rest(views)
-    assert found is not None
-    assert found.time == 3.0
-    np.testing.assert_array_equal(found.ids, np.arange(12))  # corners of half the views and more
-    np.testing.assert_array_equal(found.pixels, 2.0)
-    assert view_at_rest([]) is None
-    few = view_at_rest([view(ids=range(0, 6)), view(ids=range(6, 12)), view(ids=range(12, 18))])
-    assert few is not None
-    assert len(few.ids) == 18
-    half = view_at_rest([view(ids=range(8)), view(ids=range(16))])
-    assert half is not None
-    assert len(half.ids) == 16
 
 
 def camera(name: str, centre=(0.0, 0, 0)):

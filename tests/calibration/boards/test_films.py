@@ -10,7 +10,7 @@ import pytest
 
 from shadowpuppet.calibration.boards import films
 from shadowpuppet.calibration.boards.detection import View
-from shadowpuppet.calibration.boards.films import LEAST_STEP, SAMPLES, _Facts, _velocity, films_in, read_films
+from shadowpuppet.calibration.boards.films import LEAST_STEP, SAMPLES, _Facts, _velocity, films_in, read_films, view_at_rest
 from shadowpuppet.errors import CalibrationError
 
 
@@ -36,6 +36,26 @@ def test_velocities_of_corners_are_their_own_or_the_others_mean():
     assert _velocity(before, view([1, 9], [[0, 2], [0, 0]]), 10.0) is None  # fewer than half
     assert _velocity(before, view([1, 2], [[0, 2], [10, 2]]), 10.0) is not None
     assert _velocity(before, None, 10.0) is None
+
+
+def at_rest(ids, pixels: float = 0.0, time: float = 0.0) -> View:
+    return view(ids, np.full((len(ids), 2), pixels), time)
+
+
+def test_a_board_at_rest_is_the_median_of_its_views():
+    views = [at_rest(range(12), 1.0, 3.0), at_rest(range(12), 2.0, 4.0), at_rest(range(20), 9.0, 5.0)]
+    found = view_at_rest(views)
+    assert found is not None
+    assert found.time == 3.0
+    np.testing.assert_array_equal(found.ids, np.arange(12))  # corners of half the views and more
+    np.testing.assert_array_equal(found.pixels, 2.0)
+    assert view_at_rest([]) is None
+    few = view_at_rest([at_rest(range(0, 6)), at_rest(range(6, 12)), at_rest(range(12, 18))])
+    assert few is not None
+    assert len(few.ids) == 18
+    half = view_at_rest([at_rest(range(8)), at_rest(range(16))])
+    assert half is not None
+    assert len(half.ids) == 16
 
 
 class Board:
