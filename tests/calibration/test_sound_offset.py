@@ -6,7 +6,16 @@ import noises
 import numpy as np
 import pytest
 
-from shadowpuppet.calibration.sound_offset import RATE, SPEED_OF_SOUND, best_shift, onset_strengths, sound_offsets
+from shadowpuppet.calibration.sound_offset import (
+    HOP,
+    MIN_OVERLAP,
+    RATE,
+    SPEED_OF_SOUND,
+    _likenesses,
+    best_shift,
+    onset_strengths,
+    sound_offsets,
+)
 
 PLACES = np.array([[0, 0, 1], [3, 0, 1], [0, 3, 1.0], [3, 3, 1]])
 
@@ -111,3 +120,20 @@ def test_in_few_shifts_the_best_of_noise_is_not_taken_for_an_offset():
     rng = np.random.default_rng(3)
     for _ in range(12):  # 0.3 s more than they must have in common: no other shift is far enough off to compare with
         assert best_shift(*(onset_strengths(rng.standard_normal(round(2.3 * RATE))) for _ in range(2))) is None
+
+
+@pytest.mark.parametrize(("first", "second"), [(80, 80), (80, 150), (150, 80)])
+def test_likeness_at_each_shift_is_that_of_the_plain_loop(first, second):
+    rng, least = np.random.default_rng(0), MIN_OVERLAP * RATE / HOP
+    first, second = round(least) + first, round(least) + second
+    a, b = rng.random((2, first)), rng.random((2, second))
+    found = _likenesses(a, b)
+    assert found is not None
+    lags, likeness = found
+    shared = {}
+    for lag in range(-first + 1, second):
+        begin, end = max(0, -lag), min(first, second - lag)
+        if end - begin >= least:
+            shared[lag] = (a[:, begin:end] * b[:, begin + lag : end + lag]).sum() / np.sqrt(end - begin)
+    assert lags.tolist() == list(shared)
+    np.testing.assert_allclose(likeness, list(shared.values()))

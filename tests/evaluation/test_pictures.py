@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from measured import run_that_errs
+from measured import TRUTH, run_that_errs, write_run
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.evaluation.evaluation import measure_run
@@ -26,6 +26,7 @@ from shadowpuppet.evaluation.report.pictures import (
     report_frames,
 )
 from shadowpuppet.geometry import rigid
+from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.video.frames import Frame
 
@@ -132,3 +133,12 @@ def test_frames_name_their_worst_joints(tmp_path):
         errors = {name: 1000 * of.errors.distance[each.frame, j] for j, name in enumerate(of.errors.names)}
         assert each.error == pytest.approx(np.mean(list(errors.values())))
         assert list(each.worst) == [(name, pytest.approx(errors[name])) for name in sorted(errors, key=lambda name: -errors[name])[:3]]
+
+
+def test_a_joint_without_a_place_is_off_by_what_counts_for_it(tmp_path):
+    table = JointTable(TRUTH.times, TRUTH.names, TRUTH.positions.copy())
+    table.positions[7, TRUTH.names.index("left_elbow")] = np.nan
+    write_joints(tmp_path / "truth.csv", TRUTH)
+    of = measure_run(write_run(tmp_path / "run", table, truth=tmp_path / "truth.csv", status=["tracked"] * len(TRUTH.times)))
+    (worst,) = [each for each in report_frames(of) if each.frame == 7]
+    assert worst.worst[0] == ("left_elbow", 500)

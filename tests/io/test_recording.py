@@ -299,3 +299,9 @@ def test_shared_recordings_are_read(shared):
 def test_a_name_that_is_too_long_is_said():
     with pytest.raises(RecordingError, match=r"cannot be read \(file name too long\)|no such recording"):
         read_recording("a" * 300)
+
+
+def test_a_file_that_is_no_film_is_said_before_its_calibration_is_read(tmp_path):
+    (tmp_path / "film.mp4").write_text("no film")
+    with pytest.raises(VideoError, match=r"film\.mp4: no film that can be read"):
+        read_recording(tmp_path / "film.mp4", calibration=tmp_path / "nowhere.toml")

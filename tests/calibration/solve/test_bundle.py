@@ -8,7 +8,7 @@ import boards
 import numpy as np
 import pytest
 
-from shadowpuppet.calibration.solve.bundle import projected
+from shadowpuppet.calibration.solve.bundle import adjust, projected
 from shadowpuppet.calibration.solve.lens import MODELS, lens_advice, solve_lens
 from shadowpuppet.calibration.solve.normal_equations import reduced, solution
 from shadowpuppet.calibration.solve.placement import place_cameras
@@ -97,6 +97,25 @@ def test_without_a_floor_z_is_up(rig):
     assert not placed.floor
     true, found = (np.array([camera.centre for camera in cameras]) for cameras in (rig, placed.cameras))
     np.testing.assert_allclose(found[:, 2] - found[0, 2], true[:, 2] - true[0, 2], atol=0.05)
+
+
+def test_what_is_held_is_the_board_on_the_floor_or_else_a_camera(rig, monkeypatch):
+    given = []
+    monkeypatch.setattr("shadowpuppet.calibration.solve.placement.adjust",
+                        lambda start, seen, free: given.append(free) or adjust(start, seen, free))
+    rng = np.random.default_rng(3)
+    views = boards.moments(rig, rng, 40)[0]
+    place_cameras(bare(rig), boards.BOARD, views, floor(rig, rng))
+    for free in given:
+        assert all(free.places)
+        assert not free.boards[-1]
+        assert sum(free.boards[:-1]) > 10
+        assert not any(free.lenses)
+    given.clear()
+    place_cameras(bare(rig), boards.BOARD, views)
+    for free in given:
+        assert sum(free.places) == len(rig) - 1
+        assert sum(free.boards) > 10
 
 
 def test_some_wrong_views_do_not_matter(rig):

@@ -146,3 +146,17 @@ def test_the_same_frame_has_the_same_mask_whatever_came_before():
     forward = [segmenter(image) for image in film]
     backward = [segmenter(image) for image in film[::-1]][::-1]
     assert all((a == b).all() for a, b in zip(forward, backward))
+
+
+@pytest.mark.parametrize(("shift", "seen"), [((0, 0), (1, 119, 1, 159)), ((20, 0), (1, 119, 0, 139)), ((-20, 0), (1, 119, 21, 160)),
+                                             ((0, 10), (0, 109, 1, 159)), ((0, -10), (11, 120, 1, 159))])
+def test_all_is_seen_but_the_frame_s_rim_of_a_pixel_and_what_lies_outside_of_it(shift, seen):
+    """By shifts of whole pixels: where the scene's pixels lie in the frame is known exactly."""
+    scene = filmed(scene_of(), noise=0)
+    movement = np.array([[1, 0, shift[0] / (WIDTH / 2)], [0, 1, shift[1] / (WIDTH / 2)], [0, 0, 1]])
+    _, gap = Registration(scene).undone(scene, movement)
+    assert gap.seen == seen
+    top, bottom, left, right = seen
+    wanted = np.full((HEIGHT, WIDTH), 255)
+    wanted[top:bottom, left:right] = 0
+    np.testing.assert_array_equal(gap.unseen, wanted)

@@ -10,6 +10,7 @@ from silhouette_scenes import SIZE, empty_shots, grey, overlap, scene, shot
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette import learn_background, recover_scene
 from shadowpuppet.silhouette.recovery.head import missing_head
+from shadowpuppet.silhouette.recovery.scene import _persons_parts
 
 TRUNK, LEGS, SKIN, POSTER = (120, 45, 40), (30, 32, 30), (90, 120, 190), (40, 200, 90)
 
@@ -193,3 +194,23 @@ def test_legs_that_keep_still_belong_to_the_person_above(rng):
     always = np.all(masks, axis=0)
     assert (found.covered & legs).sum() > 0.9 * legs.sum()
     assert (found.covered & ~np.any(masks, axis=0)).sum() < 0.05 * always.sum()
+
+
+def test_parts_of_the_person_are_large_enough_of_their_colours_and_connected():
+    """Beside the largest part: one like it, one of another colour, one too small, one that nothing connects."""
+    covered, ratio = np.zeros((120, 100), bool), np.zeros((120, 100))
+    parts = {"trunk": (slice(40, 90), slice(30, 60), 4.0), "head": (slice(20, 35), slice(38, 50), 3.0),
+             "chair": (slice(95, 110), slice(30, 60), 1.0), "speck": (slice(60, 65), slice(70, 74), 4.0),
+             "lamp": (slice(5, 30), slice(80, 95), 4.0)}  # fmt: skip
+    for rows, columns, value in parts.values():
+        covered[rows, columns], ratio[rows, columns] = True, value
+    passing = np.zeros((10, 120, 100), bool)
+    passing[:, 30:100, 40:75] = True
+    passing[:7, 10:50, 60:85] = True  # in seven of ten frames
+    region = np.ones_like(covered)
+    found = _persons_parts(covered, passing, region, ratio[region])
+    assert {name for name, (rows, columns, _) in parts.items() if found[rows, columns].any()} == {"trunk", "head"}
+    assert found[40:90, 30:60].all()
+    passing[:8, 10:50, 60:85] = True
+    assert _persons_parts(covered, passing, region, ratio[region])[5:30, 80:95].all()
+    assert not _persons_parts(np.zeros_like(covered), passing, region, ratio[region]).any()

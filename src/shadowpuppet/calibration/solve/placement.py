@@ -92,7 +92,8 @@ def _robust(rig: tuple[Camera, ...], board: Board, boards: Array, views: Sequenc
         watched = np.isin(np.arange(len(boards)), [b for _, b, _ in chosen])
         shows = [bool(np.any(seen.velocities[seen.camera == n])) for n in range(C)]
         held = laid is not None and bool(watched[laid])
-        watched[laid if held else 0] &= not held
+        if held:
+            watched[laid] = False
         late = [timed and attempt > 0 and other and moves for other, moves in zip(others, shows)]
         free = Free([True] * C if held else others, watched, late, [False] * C)
         solved = adjust(start, seen, free)
