@@ -61,7 +61,7 @@ def shaded_limbs(hull: VisualHull, masks: Sequence[Mask | None], shadows: Sequen
         return {}
     camera, pixels = np.repeat(np.array(list(known)), [*map(len, tried)]), np.concatenate(tried)
     found = _shared(hull, people, camera, pixels.astype(float))
-    limbs = {n: _areas(pixels[found & (camera == n)], shadow, pitch[n]) for n, shadow in known.items()}
+    limbs = {n: _areas(pixels[found & (camera == n)], known[n], pitch[n]) for n in np.unique(camera[found]).tolist()}
     return {n: each for n, each in limbs.items() if each.any()}
 
 
