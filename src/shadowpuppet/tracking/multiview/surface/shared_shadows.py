@@ -23,8 +23,8 @@ LEAST_CAMERAS = 3
 PITCH, THINNEST = 0.06, 0.02
 """Distance (pixels) of the rays tried in a picture, and the radius below which what they find is no limb, over the square root of the
 silhouette's area: about a forearm's width, and a sixth of it on each side."""
-LEAST_LENGTH = 0.03
-"""Least length (m) of a ray's part within all other silhouettes."""
+LEAST_LENGTH = 0.08
+"""Least length (m) of a ray's part within all other silhouettes: an ankle's thickness. Shadows beside a foot are near it, too."""
 ALONG = (0.25, 0.5, 0.75)
 """Places on such a part, of which the other cameras must see one within their pictures."""
 
