@@ -24,8 +24,8 @@ PITCH, THINNEST = 0.06, 0.02
 """Distance (pixels) of the rays tried in a picture, and the radius below which what they find is no limb, over the square root of the
 silhouette's area: about a forearm's width, and a sixth of it on each side."""
 LEAST_LENGTH, LIMB_LENGTH = 0.03, 0.08
-"""Least length (m) of a ray's part within all other silhouettes, and the length that one ray of a limb has: an ankle's thickness. Of a shadow
-beside a foot the others leave shorter parts."""
+"""Least length (m) of a ray's part within all other silhouettes, and the length that one ray of a limb has: an ankle's thickness. A shadow
+beside a foot has shorter parts only."""
 ALONG = (0.25, 0.5, 0.75)
 """Places on such a part, of which the other cameras must see one within their pictures."""
 
@@ -104,9 +104,10 @@ def _limbs(pixels: NDArray[np.int64], lengths: Array, shadow: Mask, pitch: int) 
     found = np.zeros(shadow.shape, np.uint8)
     found[pixels[:, 1], pixels[:, 0]] = 1
     around = np.asarray(cv2.dilate(found, np.ones((pitch + 1, pitch + 1), np.uint8)), np.uint8) & shadow.view(np.uint8)
-    _, parts = cv2.connectedComponents(cv2.morphologyEx(around, cv2.MORPH_OPEN, disc(round(THINNEST / PITCH * pitch))), connectivity=4)
-    x, y = pixels[lengths >= LIMB_LENGTH].T
-    limbs = np.zeros(int(np.max(parts)) + 1, bool)
-    limbs[np.asarray(parts)[y, x]] = True
-    limbs[0] = False
-    return limbs[np.asarray(parts)]
+    firm = cv2.morphologyEx(around, cv2.MORPH_OPEN, disc(round(THINNEST / PITCH * pitch)))
+    number, labels = cv2.connectedComponents(firm, connectivity=4)
+    parts, (x, y) = np.asarray(labels, np.intp), pixels[lengths >= LIMB_LENGTH].T
+    limb = np.zeros(number, bool)
+    limb[parts[y, x]] = True
+    limb[0] = False
+    return limb[parts]
