@@ -62,6 +62,8 @@ class Segmenter:
     4. Clean up (`cleanup.clean`, if the setting `clean` asks for it): remove specks, keep the largest part and what nearly touches it,
        move the outline to half the contrast of the unsmoothed frame (`boundary.at_half_contrast`), fill small holes.
 
+    Several cameras then decide together on what each of them took for shadow (`tracking.multiview.surface.shared_shadows`).
+
     The noise that step 3 assumes is set once, by `learning.assumed_sigma`: the greatest of the empty scene's, the film's own
     (`background.film_noise`, after step 2) and the setting `noise_floor`, plus a share of the background's edges.
     """
