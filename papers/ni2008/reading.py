@@ -22,7 +22,7 @@ from shadowpuppet.io.recording import read_recording
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.options import make_options
-from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
+from shadowpuppet.pipeline.rig import open_rig, read_frames
 from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.dressed import dressed
@@ -57,7 +57,7 @@ def read(source: Source) -> tuple[tuple[Camera, ...], dict[str, NDArray[Any]]]:
     survey = survey_rig(rig, options)
     if survey.look.refusal is not None:
         raise TrackingError(f"{survey.look.recording}: {survey.look.refusal}")
-    sets = synchronized_frames(rig, survey.silhouettes, ready=source.masks)
+    sets = read_frames(rig, [each.following() for each in survey.silhouettes], ready=source.masks)
     seen = (Seen(each.time, list(each.masks)) for each in sets)
     return rig.cameras, _arrays(rig.cameras, rig.rate, seen, read_joints(recording.truth), read_motion(recording.training), OPENED)
 

@@ -233,7 +233,10 @@ def test_rows_that_fill_the_last_blocks_of_h264_are_no_other_scale(tmp_path, pic
         found = read_recording(folder).views[0].camera
     assert found.size == pictures
     np.testing.assert_allclose(found.matrix, camera.matrix)  # not scaled: points stay
-    film(folder / "masks" / "cam.mp4", calibrated)
+    film(folder / "masks" / "cam.mp4", calibrated)  # without the padding, or with it
+    with pytest.warns(ShadowPuppetWarning, match="padding"):
+        read_recording(folder)
+    film(folder / "masks" / "cam.mp4", (32, 376))
     with pytest.warns(ShadowPuppetWarning, match="padding"), pytest.raises(RecordingError, match=r"masks/cam\.mp4: found pictures of"):
         read_recording(folder)
 

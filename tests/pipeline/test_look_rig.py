@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from dataclasses import replace
+from typing import ClassVar
 
 import made
 import made_rig
@@ -20,7 +21,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener, json_text
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.survey.rig import survey_rig
-from shadowpuppet.pipeline.track import look_at, track_recording
+from shadowpuppet.pipeline.track import MULTIVIEW, look_at, prepare, track_recording
 
 MASKS = Options(masks=True)
 
@@ -102,6 +103,34 @@ def test_swapped_films_are_reported(spoilt):
         shutil.move(b, a)
         shutil.move(spoilt / "x", b)
     assert any("cameras 'cam1' and 'cam2' are swapped" in doubt for doubt in looked(spoilt).doubts)
+
+
+def test_without_an_empty_scene_the_silhouettes_may_be_why_cameras_do_not_fit_together(spoilt):
+    def turned(degrees, camera):
+        a = np.radians(degrees)
+        turn = rigid([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]], np.zeros(3))
+        return replace(camera, T_camera_world=turn @ camera.T_camera_world)
+
+    write_calibration(spoilt / "calibration.toml", list(map(turned, (5, -5, 9, -9), made_rig.cameras())))
+    assert "cameras and calibration do not fit: calibrate again" in {doubt.short for doubt in looked(spoilt).doubts}
+    shutil.rmtree(spoilt / "background")
+    said = {doubt.short for doubt in looked(spoilt, Options()).doubts}
+    assert "silhouettes do not fit together: film the empty scene, or calibrate" in said
+
+
+def test_what_the_look_found_is_shown_where_nobody_can_be_measured(recording):
+    def unmeasured(*_):
+        raise TrackingError("nobody")
+
+    class Shown(Listener):
+        looks: ClassVar[list[RigLook]] = []
+
+        def look(self, look):
+            self.looks.append(look)
+
+    with pytest.raises(TrackingError, match="nobody"):
+        prepare(np.random.default_rng(0), open_rig(recording, MASKS), MASKS, MULTIVIEW._replace(fit=unmeasured), listener=Shown())
+    assert Shown.looks == [looked(recording)]
 
 
 def test_a_calibration_in_millimetres_is_refused_as_it_is_read(spoilt, capsys):

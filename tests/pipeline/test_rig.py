@@ -16,6 +16,7 @@ from shadowpuppet.pipeline.footage import CameraFrame, Footage, chosen_views, cu
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.repair.films import check_calibration
 from shadowpuppet.pipeline.rig import LATE, Rig, open_rig, read_frames, synchronized_frames
+from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.video import write_frames
 
 SIZE = (32, 16)
@@ -50,8 +51,8 @@ def rig(folder: Path, *times: np.ndarray, starts=(), duration: float | None = No
     return Rig(recording, tuple(Footage(recording, view, view.camera) for view in views))
 
 
-def bright(shot: CameraFrame) -> np.ndarray:
-    return shot.image[:, :, 1] > 127
+def bright(shot: CameraFrame) -> Segmented:
+    return Segmented(shot.image[:, :, 1] > 127)
 
 
 def numbers(made: Rig, **more) -> list[tuple[int | None, ...]]:
@@ -85,7 +86,7 @@ def test_sets_do_not_depend_on_threads(tmp_path, threads):
 def test_only_every_nth_set_is_looked_at(tmp_path, every):
     looked = []
 
-    def see(shot: CameraFrame) -> np.ndarray:
+    def see(shot: CameraFrame) -> Segmented:
         looked.append(number_of(shot.image))
         return bright(shot)
 
@@ -205,7 +206,7 @@ def test_a_film_that_is_cut_off_leaves_the_others(tmp_path):
 def test_a_silhouette_that_cannot_be_made_costs_that_camera_only(tmp_path):
     made = rig(tmp_path, steady(12), steady(12))
 
-    def fails(shot: CameraFrame) -> np.ndarray:
+    def fails(shot: CameraFrame) -> Segmented:
         if shot.time > 0.35:
             raise SilhouetteError("masks/cam2.mkv: none left")
         return bright(shot)
@@ -217,7 +218,7 @@ def test_a_silhouette_that_cannot_be_made_costs_that_camera_only(tmp_path):
 
 
 def test_other_errors_are_not_swallowed(tmp_path):
-    def broken(shot: CameraFrame) -> np.ndarray:
+    def broken(shot: CameraFrame) -> Segmented:
         raise RuntimeError("a bug")
 
     with pytest.raises(RuntimeError, match="a bug"):
@@ -283,7 +284,7 @@ def test_one_cameras_frames_are_read_as_several_cameras_are(tmp_path, every):
 
 
 def test_one_camera_that_breaks_off_is_an_error(tmp_path):
-    def fails(frame: CameraFrame) -> np.ndarray:
+    def fails(frame: CameraFrame) -> Segmented:
         raise SilhouetteError("none left")
 
     with pytest.raises(SilhouetteError, match="none left"):

@@ -225,6 +225,22 @@ def test_frames_are_scaled_by_areas(tmp_path, grey):
     assert images_of(open_frames(path, grey=grey, size=(64, 48)))[0].shape[:2] == (48, 64)
 
 
+@pytest.mark.parametrize("grey", [False, True])
+def test_frames_are_cut_or_filled_up_with_their_edge_before_they_are_scaled(tmp_path, grey):
+    image = np.random.default_rng(5).integers(0, 256, (20, 30, 3), np.uint8)
+    write_image(tmp_path / "scene.png", image)
+    (plain,), (larger,), (smaller,) = (list(open_frames(tmp_path / "scene.png", grey=grey, whole=whole))
+                                       for whole in (None, (32, 24), (16, 20)))
+    np.testing.assert_array_equal(larger.image[:20, :30], plain.image)
+    np.testing.assert_array_equal(larger.image[20:, :30], np.broadcast_to(plain.image[-1:], larger.image[20:, :30].shape))
+    np.testing.assert_array_equal(larger.image[:20, 30:], np.broadcast_to(plain.image[:, -1:], larger.image[:20, 30:].shape))
+    np.testing.assert_array_equal(smaller.image, plain.image[:, :16])
+    half = open_frames(tmp_path / "scene.png", grey=grey, whole=(16, 20), size=(8, 10))
+    assert half.size == (8, 10)
+    (small,) = half
+    np.testing.assert_allclose(small.image, smaller.image.reshape(10, 2, 8, 2, -1).mean((1, 3)).reshape(small.image.shape), atol=1)
+
+
 def test_a_change_of_size_is_said(tmp_path):
     path = tmp_path / "a.mjpeg"
     with open(path, "wb") as out:

@@ -254,7 +254,7 @@ def _without_padding(view: View) -> View:
     if camera_number(view.video) is not None:
         return view
     found, expected = open_frames(view.video).size, view.camera.size
-    if found == expected or not all(_is_padded(a, b) or _is_padded(b, a) for a, b in zip(found, expected)):
+    if found == expected or not differ_by_padding(found, expected):
         return view
     which = ("film", "calibration") if sum(found) > sum(expected) else ("calibration", "film")
     warn(f"{view.video}: found pictures of {found[0]} x {found[1]} pixels, the calibration of camera {view.camera.name!r} is for "
@@ -263,19 +263,25 @@ def _without_padding(view: View) -> View:
     return replace(view, camera=replace(view.camera, size=found))
 
 
+def differ_by_padding(first: tuple[int, int], second: tuple[int, int]) -> bool:
+    """Whether two sizes (width, height) are equal but for the padding of H.264."""
+    return all(_is_padded(a, b) or _is_padded(b, a) for a, b in zip(first, second))
+
+
 def _is_padded(size: int, bare: int) -> bool:
     """Whether `size` is `bare`, or `bare` filled up to whole blocks of H.264."""
     return size == bare or (size == -(-bare // BLOCK) * BLOCK and size - bare < MAX_PADDING * bare)
 
 
 def _check_sizes(views: Iterable[View]) -> None:
-    """Raise `RecordingError` if pictures do not have their camera's size; live cameras are not opened."""
+    """Raise `RecordingError` if pictures do not have their camera's size, which an empty scene and masks may have without the film's
+    padding, or with it; live cameras are not opened."""
     for view in views:
         for source in (view.video, view.background, view.masks):
             if source is None or camera_number(source) is not None:
                 continue
             found, (width, height) = open_frames(source).size, view.camera.size
-            if found != (width, height):
+            if found != (width, height) and not (source is not view.video and differ_by_padding(found, (width, height))):
                 raise RecordingError(f"{source}: found pictures of {found[0]} x {found[1]} pixels, the calibration of camera "
                                      f"{view.camera.name!r} is for {width} x {height}; {_remedy(found, (width, height))}")
 

@@ -29,6 +29,7 @@ from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body
 from shadowpuppet.pipeline.survey.rig import OPENED, OPENING
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
+from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 from shadowpuppet.video import Image
 
 STEP_IN = "step in between the cameras and move a little"
@@ -66,6 +67,7 @@ class RigSession(LiveSession):
         body = average_body(self.options.multiview.body)
         self._pictures = [Picture(body, camera, camera.T_camera_world) for camera in self._worked]
         self._segment: list[Segment] = []
+        self._share = SharedShadows(self._worked)
         self._found_again: Callable[[], list[Scene] | None] | None = None
         self._due, self._between = np.inf, FIRST_REFINED
         given = self.scene if self.scene and all(self.scene) else None
@@ -214,7 +216,8 @@ class RigSession(LiveSession):
         return tuple(map(scaled, shot.images, self._worked))
 
     def _masks(self, shot: SnapshotSet, images: tuple[Image, ...]) -> tuple[Mask, ...]:
-        return tuple(segment(CameraFrame(shot.captured, image, None)) for segment, image in zip(self._segment, images))
+        found = [segment(CameraFrame(shot.captured, image, None)) for segment, image in zip(self._segment, images)]
+        return tuple(mask for mask in self._share(found) if mask is not None)  # each camera has one
 
     def _forget_time(self) -> None:
         self._watch = None if self._watch is None else RigWatch(len(self.full))

@@ -20,6 +20,7 @@ from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage, 
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig, open_rig, synchronized_frames
 from shadowpuppet.silhouette.background import sample_frames
+from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.video import FrameSource, Image, Size, open_frames
 from shadowpuppet.video.capture import Capture
 from shadowpuppet.video.live_source import ADDRESS, Feed, film_feed, open_feed
@@ -132,8 +133,8 @@ class _FilmSet:
                 yield each.time, images
 
 
-def _no_mask(frame: CameraFrame) -> np.ndarray:
-    return np.zeros((0, 0), bool)
+def _no_mask(frame: CameraFrame) -> Segmented:
+    return Segmented(np.zeros((0, 0), bool))
 
 
 def film_set_feed(rig: Rig, speed: float = 1.0) -> Feed:

@@ -220,10 +220,11 @@ class Session(LiveSession):
 
     def _masks(self, shot: Snapshot, images: tuple[Image, ...]) -> tuple[Mask, ...]:
         """The silhouette (H, W); before tracking a clean one, as measuring a person needs."""
-        segment = self._segment if self.phase == "tracking" else self._clean
+        clean = None if self._clean is None else self._clean.segmented
+        segment = self._segment if self.phase == "tracking" else clean
         if segment is None:
             return ()
-        return (segment(CameraFrame(shot.captured, images[0], None)),)
+        return (segment(CameraFrame(shot.captured, images[0], None)).mask,)
 
     def _forget_time(self) -> None:
         if self.phase == "learning":

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, choices
-from shadowpuppet.io.recording import Recording, View, read_recording
+from shadowpuppet.io.recording import Recording, View, differ_by_padding, read_recording
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video import FrameSource, Image, camera_number, open_frames
 from shadowpuppet.video.frames import ROUNDING, Wanted
@@ -76,7 +76,8 @@ class Footage:
             passed += 1
             return passed == read
 
-        masks = open_frames(self.view.masks, size=self.camera.size).read(of_masks) if ready and self.view.masks else None
+        ready_ones = self.view.masks if ready else None
+        masks = None if ready_ones is None else open_frames(ready_ones, size=self.camera.size, whole=self.view.camera.size).read(of_masks)
         for frame in self.film.read(of_film):
             if end is not None and frame.time - start > end - ROUNDING:
                 return
@@ -98,13 +99,13 @@ class Footage:
     def pictures(self, source: Path, what: str) -> Iterator[Image]:
         """Images of the same camera from another file, at the working size; `what` names them in messages.
 
-        Raises `RecordingError` if their size is not the film's.
+        Raises `RecordingError` if their size is not the film's, with or without the padding of H.264.
         """
         frames, (width, height) = open_frames(source), self.view.camera.size
-        if frames.size != (width, height):
+        if frames.size != (width, height) and not differ_by_padding(frames.size, (width, height)):
             raise RecordingError(f"{source}: found {what} of {frames.size[0]} x {frames.size[1]} pixels, expected {width} x {height} "
                                  "as the film: it must come from the same camera at the same setting")
-        return (frame.image for frame in open_frames(source, size=self.camera.size))
+        return (frame.image for frame in open_frames(source, size=self.camera.size, whole=self.view.camera.size))
 
 
 def open_footage(path: str | Path, options: Options) -> Footage:

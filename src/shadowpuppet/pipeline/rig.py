@@ -20,6 +20,7 @@ from shadowpuppet.errors import SettingsError, ShadowPuppetWarning, SilhouetteEr
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage, chosen_views, open_recording
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.video import Image
 from shadowpuppet.video.frames import ASSUMED_RATE
@@ -29,8 +30,16 @@ NEAR = 0.55
 LATE = 5
 """Number of sets without a frame of a camera after which the end of its film is reported: films rarely end with the same frame."""
 
-Segment = Callable[[CameraFrame], Mask]
-"""Makes the mask (H, W) of a camera's frame, as `Silhouettes` does."""
+Segment = Callable[[CameraFrame], Segmented]
+"""Makes the silhouette of a camera's frame, as `Silhouettes.segmented` does."""
+
+Share = Callable[[Sequence[Segmented | None]], tuple[Mask | None, ...]]
+"""Makes the masks (H, W) of a set's cameras of their silhouettes; None for a camera without a frame."""
+
+
+def unshared(found: Sequence[Segmented | None]) -> tuple[Mask | None, ...]:
+    """Masks (H, W) as each camera has them."""
+    return tuple(None if each is None else each.mask for each in found)
 
 
 class FrameSet(NamedTuple):
@@ -113,9 +122,12 @@ def open_rig(path: str | Path, options: Options) -> Rig:
 
 
 def read_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = False, every: int = 1) -> Generator[FrameSet]:
-    """Every `every`-th frame set with its silhouettes; frames of several cameras are aligned by `synchronized_frames`."""
+    """Every `every`-th frame set with its silhouettes; frames of several cameras are aligned by `synchronized_frames`, and what one of them
+    takes for shadow is looked at by the others."""
     if rig.is_multiview:
-        return synchronized_frames(rig, segment, ready=ready, every=every)
+        from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
+
+        return synchronized_frames(rig, segment, ready=ready, every=every, share=SharedShadows(rig.cameras))
     return _single_frames(rig, segment[0], ready, every)
 
 
@@ -127,12 +139,12 @@ def _single_frames(rig: Rig, segment: Segment, ready: bool, every: int) -> Gener
         if (frame := next(frames, None)) is None:
             return
         decoded = time.perf_counter()
-        mask = segment(frame)
+        mask = segment(frame).mask
         yield FrameSet(frame.time, (frame.image,), (mask,), decoded - start, time.perf_counter() - decoded)
 
 
 def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = False, every: int = 1,
-                        threads: int | None = None) -> Generator[FrameSet]:
+                        threads: int | None = None, share: Share = unshared) -> Generator[FrameSet]:
     """Synchronized frame sets of all cameras with their silhouettes.
 
     Each set contains each camera's frame nearest to its time, within about half the sets' interval (`NEAR`). A camera is missing from the
@@ -144,6 +156,7 @@ def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = F
         every: segment and return only every `every`-th set.
         threads: number of threads that make the next set while the last one is used; by default one less than the processor's cores. The
             sets do not depend on it.
+        share: makes the masks of a set of what is segmented in each of its pictures.
     """
     readers = [CameraReader(footage, one, ready) for footage, one in zip(rig.footage, segment)]
     leaders, step = rig.leaders, 1 / rig.rate
@@ -160,15 +173,18 @@ def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = F
             work = _begin(pool, readers, leaders, step, moment, wanted=n % every == 0)
             if n % every != 1 % every:
                 continue
-            yield FrameSet(moment, tuple(part.image for part in parts), tuple(part.mask for part in parts),
-                           sum(part.decoding for part in parts), sum(part.segmenting for part in parts))
+            start = time.perf_counter()
+            masks = share([part.segmented for part in parts])
+            sharing = time.perf_counter() - start
+            yield FrameSet(moment, tuple(part.image for part in parts), masks,
+                           sum(part.decoding for part in parts), sum(part.segmenting for part in parts) + sharing)
 
 
 class _Part(NamedTuple):
     """One camera's part of a frame set."""
 
     image: Image | None
-    mask: Mask | None
+    segmented: Segmented | None
     decoding: float
     segmenting: float
 
@@ -192,16 +208,17 @@ class CameraReader:
             self.next, self.trouble = None, str(error)
 
     def take(self, moment: float, reach: float, leads: bool, wanted: bool) -> _Part:
-        """The frame nearest to time `moment` (s), at most `reach` (s) away, or the next if this camera `leads`; its mask if `wanted`."""
+        """The frame nearest to time `moment` (s), at most `reach` (s) away, or the next if this camera `leads`, and its silhouette if
+        `wanted`."""
         start = time.perf_counter()
         best = self._pop() if leads else self._nearest(moment, reach)
         decoded = time.perf_counter()
         try:
-            mask = None if best is None or not wanted else self.segment(best)
+            found = None if best is None or not wanted else self.segment(best)
         except SilhouetteError as error:
-            best = mask = None
+            best = found = None
             self.next, self.trouble = None, str(error)
-        return _Part(None if best is None else best.image, mask, decoded - start, time.perf_counter() - decoded)
+        return _Part(None if best is None else best.image, found, decoded - start, time.perf_counter() - decoded)
 
     def _pop(self) -> CameraFrame | None:
         frame = self.next

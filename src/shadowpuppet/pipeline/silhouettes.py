@@ -15,6 +15,7 @@ from shadowpuppet.silhouette import RecoveredScene, Segmenter, SilhouetteSetting
 from shadowpuppet.silhouette.added import AddedParts, StillParts, find_still
 from shadowpuppet.silhouette.clutter import Clutter, find_clutter
 from shadowpuppet.silhouette.maintenance import MaintainedSegmenter
+from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.video import Image
 
 
@@ -45,23 +46,20 @@ class Silhouettes:
 
     def __call__(self, frame: CameraFrame) -> Mask:
         """The person's mask (H, W)."""
+        return self.segmented(frame).mask
+
+    def segmented(self, frame: CameraFrame) -> Segmented:
+        """The person's silhouette, and what is taken for shadow."""
         if self.segmenter is None:
-            mask = self._within(ready_mask(frame.ready if frame.ready is not None else frame.image))
-        else:
-            mask = self._within(self.segmenter(frame.image))
-        return mask if self.clutter is None else self.clutter.removed(mask)
+            return self._kept(Segmented(ready_mask(frame.ready if frame.ready is not None else frame.image)))
+        return self._kept(self.segmenter.segmented(self.segmenter.labelled(frame.image)))
 
-    def following(self) -> Callable[[CameraFrame], Mask]:
-        """Makes the masks (H, W) of the film's frames, one after another; with `maintain` the background follows lasting changes."""
+    def following(self) -> Callable[[CameraFrame], Segmented]:
+        """Makes the silhouettes of the film's frames, one after another; with `maintain` the background follows lasting changes."""
         if self.segmenter is None or not self.segmenter.settings.maintain:
-            return self
+            return self.segmented
         maintained = MaintainedSegmenter(self.segmenter)
-
-        def mask_of(frame: CameraFrame) -> Mask:
-            mask = self._within(maintained(frame.image, frame.time))
-            return mask if self.clutter is None else self.clutter.removed(mask)
-
-        return mask_of
+        return lambda frame: self._kept(maintained.segmented(frame.image, frame.time))
 
     def of_several(self) -> Silhouettes:
         """A copy whose masks keep everybody in the picture, not only the largest part."""
@@ -102,6 +100,15 @@ class Silhouettes:
             return image
         movement = correction.registration.movement(image)
         return image if movement is None else correction.registration.undone(image, movement)[0]
+
+    def _kept(self, found: Segmented) -> Segmented:
+        """A silhouette within the region, without clutter."""
+        again = found.with_limbs
+        return Segmented(self._person(found.mask), found.shadow, None if again is None else lambda limbs: self._person(again(limbs)))
+
+    def _person(self, mask: Mask) -> Mask:
+        mask = self._within(mask)
+        return mask if self.clutter is None else self.clutter.removed(mask)
 
     def _within(self, mask: Mask) -> Mask:
         if self.region is None:
@@ -149,7 +156,8 @@ def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
     """Masks (H, W) of the film's frames, one after another, as `track_recording` makes them. Raises `SilhouetteError` or
     `SettingsError`."""
     silhouettes = uncluttered_silhouettes(footage, take_sample(footage, options.masks), options)
-    return map(silhouettes.following(), footage.frames(ready=options.masks))
+    segment = silhouettes.following()
+    return (segment(frame).mask for frame in footage.frames(ready=options.masks))
 
 
 def uncluttered_silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouettes:

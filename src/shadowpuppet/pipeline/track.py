@@ -168,7 +168,11 @@ def _fitted(rng: np.random.Generator, survey: Survey, options: Options, kind: Ki
     if survey.look.refusal is not None and not options.anyway:
         return Prepared(survey, None, survey.look)
     listener.begin("measuring the person")
-    subject = kind.fit(rng, survey, options)
+    try:
+        subject = kind.fit(rng, survey, options)
+    except TrackingError:
+        listener.look(survey.look)  # which may say why
+        raise
     for _ in range(LOOKS_AGAIN):
         again = _looked_again(survey, subject, options, kind, listener)
         if again is None:

@@ -90,8 +90,13 @@ class ChannelClassifier:
 
     def __call__(self, image: Image) -> Labels:
         """Labels (H, W) of a picture (H, W, 3) or (H, W)."""
+        return self.with_shadows(image)[0]
+
+    def with_shadows(self, image: Image) -> tuple[Labels, NDArray[np.bool_] | None]:
+        """Labels (H, W) of a picture (H, W, 3) or (H, W), and the background pixels (H, W) that a dark limb might look like; None if no
+        pixel counts as shadow."""
         from shadowpuppet.silhouette.areas import with_areas
-        from shadowpuppet.silhouette.shadows import MAX_SHADE, resolve_shadows
+        from shadowpuppet.silhouette.shadows import MAX_SHADE, MAYBE_SHADOW, resolve_shadows
 
         planes = to_planes(image)
         resolved = self.darkest < 1 and SHADOW_CHANNELS[self.key][0] > 0
@@ -99,7 +104,11 @@ class ChannelClassifier:
         label = self.labels(smooth, asked)
         if self.areas is not None:
             label = with_areas(label, self.by_area.labels(self.areas.average(planes), asked))
-        return resolve_shadows(label, smooth, self.mean, self.inverse_sigma, self.noise, self.smeared) if resolved else label
+        if not resolved:
+            return label, None
+        either = label == MAYBE_SHADOW
+        label = resolve_shadows(label, smooth, self.mean, self.inverse_sigma, self.noise, self.smeared)
+        return label, either & (label == 0)
 
     @cached_property
     def by_area(self) -> ChannelClassifier:

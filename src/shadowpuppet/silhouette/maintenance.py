@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from shadowpuppet.silhouette.background import Image, smoothed, to_planes
 from shadowpuppet.silhouette.classifiers import ChannelClassifier
 from shadowpuppet.silhouette.cleanup import bounding_window, coarse_person
-from shadowpuppet.silhouette.segmenter import Labelled, Segmenter
+from shadowpuppet.silhouette.segmenter import Labelled, Segmented, Segmenter
 
 INTERVAL = 0.5
 """Seconds from one look at the pixels beside the person to the next."""
@@ -61,12 +61,16 @@ class MaintainedSegmenter:
 
     def __call__(self, image: Image, time: float) -> NDArray[np.bool_]:
         """The person's mask (H, W) in a frame (H, W, 3) or (H, W) at `time` (s). Raises `SilhouetteError` for a frame that does not fit."""
+        return self.segmented(image, time).mask
+
+    def segmented(self, image: Image, time: float) -> Segmented:
+        """The silhouette in a frame (H, W, 3) or (H, W) at `time` (s). Raises `SilhouetteError` for a frame that does not fit."""
         labelled = self.segmenter.labelled(image)
-        mask = self.segmenter.finished(labelled)
-        if self._slow is not None and self._goes_on(mask) and time >= self._next:
+        found = self.segmenter.segmented(labelled)
+        if self._slow is not None and self._goes_on(found.mask) and time >= self._next:
             self._next = time + INTERVAL - 1e-6
-            self._look(labelled, mask, self._slow)
-        return mask
+            self._look(labelled, found.mask, self._slow)
+        return found
 
     def _goes_on(self, mask: NDArray[np.bool_]) -> bool:
         """Whether a frame's mask (H, W) is the last one's person. If it jumps, to a patch of light that is larger than the person for

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.silhouette.background import Background, Image, check_alike, check_image, to_planes
 from shadowpuppet.silhouette.boundary import Contrast, EdgeProfile, Labels
-from shadowpuppet.silhouette.classifiers import METHODS, AveragingClassifier, Classifier
+from shadowpuppet.silhouette.classifiers import METHODS, AveragingClassifier, ChannelClassifier, Classifier
 from shadowpuppet.silhouette.cleanup import Window, clean
 from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.correction.registration import Gap
@@ -29,6 +30,19 @@ class Labelled(NamedTuple):
     """0 background, 1 perhaps a person, 2 surely a person (H, W)."""
     gap: Gap | None
     """Pixels that a moved camera does not show; None if it stands still."""
+    shadow: NDArray[np.bool_] | None = None
+    """Background pixels (H, W) that are taken for shadow, and that a dark limb might look like; None if the method knows no shadow."""
+
+
+class Segmented(NamedTuple):
+    """A frame's silhouette, and what it would be if limbs had been taken for shadow."""
+
+    mask: NDArray[np.bool_]
+    """The person (H, W)."""
+    shadow: NDArray[np.bool_] | None = None
+    """As in `Labelled`."""
+    with_limbs: Callable[[NDArray[np.bool_]], NDArray[np.bool_]] | None = None
+    """From pixels (H, W) of `shadow` that are the person's to the mask (H, W) with them; None without `shadow`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +61,8 @@ class Segmenter:
        `averaging`, `mog2` and `knn` have comparisons of their own.
     4. Clean up (`cleanup.clean`, if the setting `clean` asks for it): remove specks, keep the largest part and what nearly touches it,
        move the outline to half the contrast of the unsmoothed frame (`boundary.at_half_contrast`), fill small holes.
+
+    Several cameras then decide together on what each of them took for shadow (`tracking.multiview.surface.shared_shadows`).
 
     The noise that step 3 assumes is set once, by `learning.assumed_sigma`: the greatest of the empty scene's, the film's own
     (`background.film_noise`, after step 2) and the setting `noise_floor`, plus a share of the background's edges.
@@ -77,20 +93,31 @@ class Segmenter:
         """
         return self.finished(self.labelled(image))
 
+    def segmented(self, labelled: Labelled) -> Segmented:
+        """The silhouette that step 4 makes of a frame after step 3."""
+        def with_limbs(limbs: NDArray[np.bool_]) -> NDArray[np.bool_]:
+            return mask | self.finished(labelled._replace(label=np.where(limbs, np.maximum(labelled.label, 1), labelled.label)))
+
+        mask = self.finished(labelled)
+        return Segmented(mask) if labelled.shadow is None else Segmented(mask, labelled.shadow, with_limbs)
+
     def labelled(self, image: Image) -> Labelled:
         """A frame's pixels after step 3. Raises `SilhouetteError` for a frame that does not fit the background."""
         self._check(image)
         gap = None
         if self.correction is not None:
             image, gap, *_ = self.correction(image)
-        label = self.classifier(image)
+        if isinstance(self.classifier, ChannelClassifier):
+            label, shadow = self.classifier.with_shadows(image)
+        else:
+            label, shadow = self.classifier(image), None
         if self.covered is not None:
             label[self.covered] = 2
-        return Labelled(image, label, gap)
+        return Labelled(image, label, gap, shadow)
 
     def finished(self, labelled: Labelled) -> NDArray[np.bool_]:
         """The mask (H, W) that step 4 makes of it."""
-        image, label, gap = labelled
+        image, label, gap, _ = labelled
         if self.settings.cleaned:
             label = clean(label, lambda window: self.contrast(image, window), self.edge, self.several)
         mask = label > 0 if self.covered is None else (label > 0) | self.covered

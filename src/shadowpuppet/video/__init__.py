@@ -20,8 +20,8 @@ __all__ = ["FILM_SUFFIXES", "IMAGE_SUFFIXES", "Frame", "FrameSource", "FrameWrit
            "read_image", "write_frames", "write_image"]
 
 
-def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | None = None,
-                rate: float | None = None) -> FrameSource:
+def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | None = None, rate: float | None = None,
+                whole: Size | None = None) -> FrameSource:
     """Open a film, a picture, a folder of pictures (in natural order), or a live camera (its number or `camera:N`).
 
     Raises `VideoError` if nothing can be read. A film that breaks off or is damaged gives the frames before the break, then a
@@ -32,6 +32,7 @@ def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | No
         grey: give frames (H, W); for films the luma, scaled to 0..255, without decoding colours.
         size: width and height to which frames are scaled.
         rate: frames/s, replaces the source's times; a folder's times are in `timestamps.txt` or `.csv` (seconds, one per picture).
+        whole: width and height to which frames are cut, or filled up with their edge, at the right and the bottom, before they are scaled.
     """
     if rate is not None and not (math.isfinite(rate) and rate > 0):
         raise VideoError(f"{source}: rate: found {rate}, expected a positive number of frames/s")
@@ -48,7 +49,21 @@ def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | No
         frames = open_picture(path, grey)
     else:
         frames = open_film(path, grey, rate)
+    if whole is not None and whole != frames.size:
+        frames = _filled(frames, whole)
     return frames if size in (None, frames.size) else _scaled(frames, size)
+
+
+def _filled(frames: FrameSource, size: Size) -> FrameSource:
+    width, height = size
+
+    def read(wanted: Wanted) -> Iterator[Frame]:
+        for time, image in frames.read(wanted):
+            cut = image[:height, :width]
+            missing = [(0, height - cut.shape[0]), (0, width - cut.shape[1]), (0, 0)][: cut.ndim]
+            yield Frame(time, np.pad(cut, missing, "edge"))
+
+    return replace(frames, size=size, read=read)
 
 
 def _scaled(frames: FrameSource, size: Size) -> FrameSource:

@@ -103,12 +103,12 @@ def gather_silhouettes(rig: Rig, options: Options, listener: Listener) -> Silhou
     every = max(1, min(round(rig.rate / MAX_SET_RATE), (rig.count or SETS * 9) // MIN_SETS))
     listener.begin("looking")
     with ThreadPoolExecutor(usable_cores(), "check") as pool:
-        segmenters = list(pool.map(lambda footage: _silhouettes(footage, options), rig.footage))
+        segments = [each.segmented for each in pool.map(lambda footage: _silhouettes(footage, options), rig.footage)]
     rows: list[Row] = []
     listener.begin("reading", SETS)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when a run comes to it
-        for n, each in enumerate(synchronized_frames(rig, segmenters, ready=options.masks, every=every, threads=usable_cores())):
+        for n, each in enumerate(synchronized_frames(rig, segments, ready=options.masks, every=every, threads=usable_cores())):
             row = silhouettes_of(each.masks)
             if rows or sum(silhouette is not None for silhouette in row) > 1:
                 rows.append(row)

@@ -12,7 +12,7 @@ import numpy as np
 
 from shadowpuppet.calibration.agreement import agreement
 from shadowpuppet.camera.mask import may_be_person
-from shadowpuppet.errors import HARMFUL, NOTED, Caution, ShadowPuppetWarning
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution, ShadowPuppetWarning
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, RigLook, Survey
 from shadowpuppet.pipeline.options import Options
@@ -24,9 +24,12 @@ from shadowpuppet.pipeline.survey.cautions import GOOD, clutter_cautions, condit
 from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, survey_film
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import usable_cores
+from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 
 OPENING, OPENED = 2.0, 40
 """With several cameras: duration (s) of the beginning in which the person is measured, and the greatest number of frame sets kept of it."""
+SILHOUETTES_OR_CAMERAS = "silhouettes do not fit together: film the empty scene, or calibrate"
+"""Ten words on an agreement that an empty scene recovered from the film may have spoiled."""
 RATES, LENGTHS = 0.02, 0.1
 """Relative difference of rates, and difference of lengths (s), above which films are reported to differ."""
 
@@ -56,7 +59,8 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agreement(rig.cameras, first.masks, step))
     refusal = _rig_refusal(look, first)
-    doubts = [*_rig_doubts(look, several > 0), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
+    recovered = any(each.recovered is not None for each in silhouettes)
+    doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     if several:
         doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
                                  f"{several} people: each is tracked", NOTED))
@@ -72,7 +76,8 @@ def _first_sets(rig: Rig, silhouettes: Sequence[Silhouettes], ready: bool) -> Fi
     every = max(1, round(OPENING * rig.rate / OPENED))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when the run comes to it
-        frames = synchronized_frames(rig, silhouettes, ready=ready, every=every, threads=usable_cores())
+        frames = synchronized_frames(rig, [each.segmented for each in silhouettes], ready=ready, every=every, threads=usable_cores(),
+                                     share=SharedShadows(rig.cameras))
         sets = [(each.time, each.masks) for each in islice(frames, OPENED)]
     sets = [each for each in sets if each[0] <= OPENING] or sets[:1]
     return FirstSeconds([time for time, _ in sets], [masks for _, masks in sets])
@@ -95,9 +100,12 @@ def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
     return look.agreement.refusal()
 
 
-def _rig_doubts(look: RigLook, several: bool = False) -> list[Caution]:
-    """Doubts about a rig; of `several` people the quality of silhouettes, which supposes one, says nothing."""
-    doubts = list(look.agreement.doubts())
+def _rig_doubts(look: RigLook, several: bool = False, recovered: bool = False) -> list[Caution]:
+    """Doubts about a rig; of `several` people the quality of silhouettes, which supposes one, says nothing; silhouettes against an empty
+    scene that was `recovered` from the film may themselves be why the cameras do not fit together."""
+    unclear = recovered and look.agreement.remedy is None
+    doubts = [Caution(doubt, SILHOUETTES_OR_CAMERAS, RUINOUS) if unclear and doubt.weight == RUINOUS else doubt
+              for doubt in look.agreement.doubts()]
     rates = np.array([camera.rate for camera in look.cameras])
     ends = {camera.name: camera.frames / camera.rate for camera in look.cameras if camera.frames is not None}
     if np.ptp(rates) > RATES * rates.min():

@@ -6,7 +6,7 @@ silhouettes (Matusik et al. 2000, "Image-based visual hulls").
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -68,6 +68,17 @@ class _Silhouette(NamedTuple):
     """First side of each run and its end, of shape (C, 2)."""
 
 
+class _Carving(NamedTuple):
+    """What `cut_rays` cuts rays with, in the order of its arguments, which it explains."""
+
+    relative: Array
+    lines: Array
+    spans: NDArray[np.int64]
+    circles: Array
+    bounds: NDArray[np.int64]
+    lenses: Array
+
+
 class VisualHull:
     """The visual hull of calibrated cameras; `points` computes surface points from their silhouettes.
 
@@ -92,15 +103,33 @@ class VisualHull:
         A mask that is None, empty, or nearly the whole picture is ignored; nothing is carved outside a picture. With fewer than two masks
         left there are no points. Raises `TrackingError` for a wrong number of masks, or for a size other than the camera's.
         """
-        if len(masks) != len(self.cameras):
-            raise TrackingError(f"silhouettes: found {len(masks)}, expected {len(self.cameras)}, one a camera (None where there is none)")
-        given = {n: check_mask(mask, camera.size, f"camera {camera.name!r}: mask")
-                 for n, (mask, camera) in enumerate(zip(masks, self.cameras)) if mask is not None}
-        people = {n: mask for n, mask in given.items() if may_be_person(mask)}
+        people = self.people(masks)
         if len(people) < 2:
             return SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))
         silhouettes = [_silhouette(mask, self._views[n]) for n, mask in people.items()]
         return self._sampled(*self._edges(silhouettes, np.array(list(people))))
+
+    def people(self, masks: Sequence[ArrayLike | None]) -> dict[int, Mask]:
+        """Masks (H, W) that may be a person's, by the camera's index. Raises `TrackingError` as `points` does."""
+        if len(masks) != len(self.cameras):
+            raise TrackingError(f"silhouettes: found {len(masks)}, expected {len(self.cameras)}, one a camera (None where there is none)")
+        given = {n: check_mask(mask, camera.size, f"camera {camera.name!r}: mask")
+                 for n, (mask, camera) in enumerate(zip(masks, self.cameras)) if mask is not None}
+        return {n: mask for n, mask in given.items() if may_be_person(mask)}
+
+    def inside(self, people: Mapping[int, Mask], camera: NDArray[np.int64], pixels: Array) -> tuple[NDArray[np.int64], Array]:
+        """The parts of viewing rays that the silhouettes of all other cameras leave.
+
+        people: masks (H, W) by the camera's index, in order. camera, pixels: the rays, as pixels (P, 2) of cameras (P,), by index. Returns
+        the index (E,) of each part's ray, and the part's ends (E, 2, 3), world, metres. What a camera does not show it does not carve.
+        """
+        which, rays = np.array(list(people)), np.zeros((len(pixels), 3))
+        for n in people:
+            rays[camera == n] = self.cameras[n].rays(pixels[camera == n])
+        carving = self._carving([_silhouette(mask, self._views[n]) for n, mask in people.items()], which)
+        ray, depths = cut_rays(np.searchsorted(which, camera), rays, *carving, 0)
+        back = inverse(self._T)[camera[ray]]
+        return ray, np.einsum("eij,ekj->eki", back[:, :3, :3], rays[ray, None] * depths[..., None]) + back[:, None, :3, 3]
 
     def _edges(self, silhouettes: list[_Silhouette], which: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array, Array, Array]:
         """Viewing edges: camera (E,), ray (E, 3) with z = 1, normal (E, 3), both in the camera's frame, and depths (E, 2)."""
@@ -110,16 +139,21 @@ class VisualHull:
         rays = np.concatenate([s.lines[t] for s, t in zip(silhouettes, taken)])
         rays = np.concatenate([rays, np.ones((len(rays), 1))], 1)
         outward = np.concatenate([s.outward[t] for s, t in zip(silhouettes, taken)])
-        lines = np.ascontiguousarray(np.concatenate([s.lines for s in silhouettes]).T)
-        firsts = np.cumsum([0, *(len(s.lines) for s in silhouettes)])
-        spans = np.concatenate([s.spans + first for s, first in zip(silhouettes, firsts)])
-        chunks = np.concatenate([s.chunks for s in silhouettes], 1)
-        bounds = np.cumsum([0, *(len(s.spans) for s in silhouettes)])
-        lenses = np.stack([self._views[n].lens for n in which])
-        T = self._T[which]
-        relative = T[None] @ inverse(T)[:, None]  # [i, j]: from camera i to j
-        ray, depths = cut_rays(camera, rays, relative, lines, spans, chunks, bounds, lenses, self.settings.tolerated)
+        ray, depths = cut_rays(camera, rays, *self._carving(silhouettes, which), self.settings.tolerated)
         return which[camera[ray]], rays[ray], outward[ray], depths
+
+    def _carving(self, silhouettes: list[_Silhouette], which: NDArray[np.int64]) -> _Carving:
+        """The silhouettes of cameras `which` (V,) as `cut_rays` takes them."""
+        firsts = np.cumsum([0, *(len(s.lines) for s in silhouettes)])
+        T = self._T[which]
+        return _Carving(
+            relative=T[None] @ inverse(T)[:, None],  # [i, j]: from camera i to j
+            lines=np.ascontiguousarray(np.concatenate([s.lines for s in silhouettes]).T),
+            spans=np.concatenate([s.spans + first for s, first in zip(silhouettes, firsts)]),
+            circles=np.concatenate([s.chunks for s in silhouettes], 1),
+            bounds=np.cumsum([0, *(len(s.spans) for s in silhouettes)]),
+            lenses=np.stack([self._views[n].lens for n in which]),
+        )  # fmt: skip
 
     def _sampled(self, camera: NDArray[np.int64], rays: Array, outward: Array, depths: Array) -> SurfacePoints:
         """Points along viewing edges of the cameras."""

@@ -1,0 +1,103 @@
+"""Dark limbs before a dark floor: one camera takes them for shadow, the others see that the person is there.
+
+A pixel taken for shadow is the person's where its viewing ray passes through the silhouettes of all other cameras. A shadow on the floor is
+no silhouette in any of them, so that its rays do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import Array
+from shadowpuppet.silhouette.boundary import disc
+from shadowpuppet.silhouette.segmenter import Segmented
+from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
+
+LEAST_CAMERAS = 3
+"""Cameras that see the person from which on this is tried: one other leaves long parts of every ray."""
+PITCH, THINNEST = 0.06, 0.02
+"""Distance (pixels) of the rays tried in a picture, and the radius below which what they find is no limb, over the square root of the
+silhouette's area: about a forearm's width, and a sixth of it on each side."""
+LEAST_LENGTH = 0.08
+"""Least length (m) of a ray's part within all other silhouettes: an ankle's thickness. Shadows beside a foot are near it, too."""
+ALONG = (0.25, 0.5, 0.75)
+"""Places on such a part, of which the other cameras must see one within their pictures."""
+
+
+class SharedShadows:
+    """Makes the masks of one moment's silhouettes; for any number of cameras."""
+
+    def __init__(self, cameras: Sequence[Camera]) -> None:
+        """`cameras`: those of the silhouettes, in order."""
+        self.hull = VisualHull(cameras)
+
+    def __call__(self, found: Sequence[Segmented | None]) -> tuple[Mask | None, ...]:
+        """The masks (H, W), None where there is no silhouette, with limbs that one camera takes for shadow and all others see."""
+        masks = [None if each is None else each.mask for each in found]
+        limbs = shaded_limbs(self.hull, masks, [None if each is None else each.shadow for each in found])
+        for n, each in enumerate(found):
+            if n in limbs and each is not None and each.with_limbs is not None:
+                masks[n] = each.with_limbs(limbs[n])
+        return tuple(masks)
+
+
+def shaded_limbs(hull: VisualHull, masks: Sequence[Mask | None], shadows: Sequence[Mask | None]) -> dict[int, Mask]:
+    """Pixels (H, W) taken for shadow that are the person's, by the camera's index; only of cameras that have some.
+
+    masks, shadows: silhouettes (H, W) and pixels taken for shadow (H, W), one per camera of the hull; None where there is none.
+    """
+    people = hull.people(masks)
+    if len(people) < LEAST_CAMERAS:
+        return {}
+    pitch = {n: max(2, round(PITCH * np.count_nonzero(mask) ** 0.5)) for n, mask in people.items()}
+    known = {n: shadow for n in people if (shadow := shadows[n]) is not None}
+    tried = [_grid(shadow, pitch[n]) for n, shadow in known.items()]
+    if not sum(map(len, tried)):
+        return {}
+    camera, pixels = np.repeat(np.array(list(known)), [*map(len, tried)]), np.concatenate(tried)
+    found = _shared(hull, people, camera, pixels.astype(float))
+    limbs = {n: _areas(pixels[found & (camera == n)], known[n], pitch[n]) for n in np.unique(camera[found]).tolist()}
+    return {n: each for n, each in limbs.items() if each.any()}
+
+
+def _grid(shadow: Mask, pitch: int) -> NDArray[np.int64]:
+    """Pixels (P, 2), x and y, of a mask (H, W), `pitch` pixels apart."""
+    y, x = np.nonzero(shadow[::pitch, ::pitch])
+    return pitch * np.stack([x, y], 1)
+
+
+def _shared(hull: VisualHull, people: Mapping[int, Mask], camera: NDArray[np.int64], pixels: Array) -> NDArray[np.bool_]:
+    """Whether each ray, of pixels (P, 2) of cameras (P,), has a place that all others of `people` see as the person, (P,)."""
+    ray, ends = hull.inside(people, camera, pixels)
+    long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) >= LEAST_LENGTH
+    ray, ends = ray[long], ends[long]
+    places = np.stack([ends[:, 0] + along * (ends[:, 1] - ends[:, 0]) for along in ALONG], 1)
+    seen = np.ones(places.shape[:2], bool)
+    for n, mask in people.items():
+        seen &= (camera[ray] == n)[:, None] | _covers(mask, hull.cameras[n].project(places))
+    out = np.zeros(len(pixels), bool)
+    out[ray[seen.any(1)]] = True
+    return out
+
+
+def _covers(mask: Mask, pixels: Array) -> NDArray[np.bool_]:
+    """Whether a mask (H, W) has the pixels (..., 2); not outside the picture, or where they are not a number."""
+    at = np.where(np.isfinite(pixels), pixels, -1.0).round().clip(-1, 2**31 - 1).astype(np.int64)
+    x, y = at[..., 0], at[..., 1]
+    within = (x >= 0) & (y >= 0) & (x < mask.shape[1]) & (y < mask.shape[0])
+    return within & mask[np.where(within, y, 0), np.where(within, x, 0)]
+
+
+def _areas(pixels: NDArray[np.int64], shadow: Mask, pitch: int) -> Mask:
+    """The part of `shadow` (H, W) around found pixels (P, 2) of the grid that is not thin."""
+    import cv2
+
+    found = np.zeros(shadow.shape, np.uint8)
+    found[pixels[:, 1], pixels[:, 0]] = 1
+    around = np.asarray(cv2.dilate(found, np.ones((pitch + 1, pitch + 1), np.uint8)), np.uint8) & shadow.view(np.uint8)
+    return np.asarray(cv2.morphologyEx(around, cv2.MORPH_OPEN, disc(round(THINNEST / PITCH * pitch))), np.uint8).view(np.bool_)
