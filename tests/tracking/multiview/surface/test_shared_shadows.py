@@ -85,3 +85,11 @@ def test_without_people_nothing_is_shared():
     empty = [np.zeros_like(mask) for mask in standing()[0]]
     assert shaded_limbs(actor.hull(), empty, [~mask for mask in empty]) == {}
     assert SharedShadows(actor.cameras())([None] * 5) == (None,) * 5
+
+
+def test_a_shadow_beside_a_foot_stays_shadow():
+    """Beside legs that are seen the others leave only short parts of rays."""
+    masks = standing()[0]
+    shadow = on_the_floor(actor.cameras()[0]) & ~masks[0]
+    assert shadow.any()
+    assert 0 not in shaded_limbs(actor.hull(), masks, [shadow, *unknown(4)])

@@ -23,8 +23,9 @@ LEAST_CAMERAS = 3
 PITCH, THINNEST = 0.06, 0.02
 """Distance (pixels) of the rays tried in a picture, and the radius below which what they find is no limb, over the square root of the
 silhouette's area: about a forearm's width, and a sixth of it on each side."""
-LEAST_LENGTH = 0.08
-"""Least length (m) of a ray's part within all other silhouettes: an ankle's thickness. Shadows beside a foot are near it, too."""
+LEAST_LENGTH, LIMB_LENGTH = 0.03, 0.08
+"""Least length (m) of a ray's part within all other silhouettes, and the length that one ray of a limb has: an ankle's thickness. A shadow
+beside a foot has shorter parts only."""
 ALONG = (0.25, 0.5, 0.75)
 """Places on such a part, of which the other cameras must see one within their pictures."""
 
@@ -60,8 +61,10 @@ def shaded_limbs(hull: VisualHull, masks: Sequence[Mask | None], shadows: Sequen
     if not sum(map(len, tried)):
         return {}
     camera, pixels = np.repeat(np.array(list(known)), [*map(len, tried)]), np.concatenate(tried)
-    found = _shared(hull, people, camera, pixels.astype(float))
-    limbs = {n: _areas(pixels[found & (camera == n)], known[n], pitch[n]) for n in np.unique(camera[found]).tolist()}
+    length = _shared(hull, people, camera, pixels.astype(float))
+    found = length >= LEAST_LENGTH
+    limbs = {n: _limbs(pixels[of_one := found & (camera == n)], length[of_one], known[n], pitch[n])
+             for n in np.unique(camera[length >= LIMB_LENGTH]).tolist()}
     return {n: each for n, each in limbs.items() if each.any()}
 
 
@@ -71,17 +74,15 @@ def _grid(shadow: Mask, pitch: int) -> NDArray[np.int64]:
     return pitch * np.stack([x, y], 1)
 
 
-def _shared(hull: VisualHull, people: Mapping[int, Mask], camera: NDArray[np.int64], pixels: Array) -> NDArray[np.bool_]:
-    """Whether each ray, of pixels (P, 2) of cameras (P,), has a place that all others of `people` see as the person, (P,)."""
+def _shared(hull: VisualHull, people: Mapping[int, Mask], camera: NDArray[np.int64], pixels: Array) -> Array:
+    """Length (m) of the longest part of each ray, of pixels (P, 2) of cameras (P,), that all others of `people` see as the person, (P,)."""
     ray, ends = hull.inside(people, camera, pixels)
-    long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) >= LEAST_LENGTH
-    ray, ends = ray[long], ends[long]
     places = np.stack([ends[:, 0] + along * (ends[:, 1] - ends[:, 0]) for along in ALONG], 1)
     seen = np.ones(places.shape[:2], bool)
     for n, mask in people.items():
         seen &= (camera[ray] == n)[:, None] | _covers(mask, hull.cameras[n].project(places))
-    out = np.zeros(len(pixels), bool)
-    out[ray[seen.any(1)]] = True
+    out = np.zeros(len(pixels))
+    np.maximum.at(out, ray, np.where(seen.any(1), np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), 0.0))
     return out
 
 
@@ -93,11 +94,20 @@ def _covers(mask: Mask, pixels: Array) -> NDArray[np.bool_]:
     return within & mask[np.where(within, y, 0), np.where(within, x, 0)]
 
 
-def _areas(pixels: NDArray[np.int64], shadow: Mask, pitch: int) -> Mask:
-    """The part of `shadow` (H, W) around found pixels (P, 2) of the grid that is not thin."""
+def _limbs(pixels: NDArray[np.int64], lengths: Array, shadow: Mask, pitch: int) -> Mask:
+    """The parts of `shadow` (H, W) around found pixels (P, 2) of the grid that are not thin, and of which one ray has a limb's length.
+
+    lengths: of the pixels' rays (P,), as `_shared` has them.
+    """
     import cv2
 
     found = np.zeros(shadow.shape, np.uint8)
     found[pixels[:, 1], pixels[:, 0]] = 1
     around = np.asarray(cv2.dilate(found, np.ones((pitch + 1, pitch + 1), np.uint8)), np.uint8) & shadow.view(np.uint8)
-    return np.asarray(cv2.morphologyEx(around, cv2.MORPH_OPEN, disc(round(THINNEST / PITCH * pitch))), np.uint8).view(np.bool_)
+    firm = cv2.morphologyEx(around, cv2.MORPH_OPEN, disc(round(THINNEST / PITCH * pitch)))
+    number, labels = cv2.connectedComponents(firm, connectivity=4)
+    parts, (x, y) = np.asarray(labels, np.intp), pixels[lengths >= LIMB_LENGTH].T
+    limb = np.zeros(number, bool)
+    limb[parts[y, x]] = True
+    limb[0] = False
+    return limb[parts]
