@@ -23,7 +23,7 @@ EXPERIMENTS = (
     Experiment("figure_6", "Fig. 6: joint angles beside the true ones", "3 minutes", figure_6.make, runs=3),
     Experiment("figure_7", "Fig. 7: RMSE of joint angles and positions", "2 minutes", figure_7.make, runs=3),
     Experiment("figure_8", "Fig. 8: RMSE against the number of regions", "10 minutes", figure_8.make, runs=2),
-    Experiment("table_2", "Table II and Fig. 9: hybrid, image force and particle filter", "5 minutes", table_2.make, runs=3),
+    Experiment("table_2", "Table II and Fig. 9: hybrid, image force and particle filter", "25 minutes", table_2.make, runs=10),
     Experiment("choices", "What the paper leaves open: bounds of the forces, noise of the particle filters", "8 minutes", choices.make),
     Experiment("particles", "VII: how many particles a plain filter needs", "20 minutes", particles.make, runs=2),
 )
