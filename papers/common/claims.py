@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,13 @@ from numpy.typing import ArrayLike
 SURE = 2.0
 """A difference between two sets of runs counts from this many standard errors."""
 HEADER = ("paper said", "where", "we got", "same conclusion?")
-ANSWERS = {True: "yes", False: "**no**", None: "inconclusive"}
+DEPENDS: Literal["depends"] = "depends"
+"""The answer where fair readings of the paper lead to different ones."""
+Answer = bool | Literal["depends"] | None
+"""Whether our conclusion is the paper's; None where the runs do not decide."""
+ANSWERS = {True: "yes", False: "**no**", DEPENDS: "depends on the reading", None: "inconclusive"}
+CONFIDENCE, NORMAL = 0.9, 1.645
+"""Of the intervals of shares, and how many standard deviations that is on either side."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +31,8 @@ class Verdict:
     """Section, figure or table of the paper."""
     got: str
     """Our result, as text made from the figures."""
-    same: bool | None
-    """Whether our conclusion is the same; None where the runs do not decide, and `got` says why."""
+    same: Answer
+    """Whether our conclusion is the same; None where the runs do not decide, `DEPENDS` where readings differ: `got` says why."""
     shown: str = ""
     """The file of its picture, if any."""
 
@@ -54,6 +60,13 @@ class Difference(NamedTuple):
         return None if abs(self.value) <= SURE * self.error or not np.isfinite(self.value) else bool(self.value > 0)
 
 
+    def under(self, limit: float) -> bool | None:
+        """Whether the first is greater by less than `limit`; None where `SURE` standard errors leave it open."""
+        if not np.isfinite(self.value) or abs(self.value - limit) <= SURE * self.error:
+            return None
+        return bool(self.value < limit)
+
+
 def difference(first: ArrayLike, second: ArrayLike) -> Difference:
     """Difference of two sets of independent runs (R,), (Q,). With a single run in a set the error is infinite."""
     first, second = np.asarray(first, float), np.asarray(second, float)
@@ -61,6 +74,40 @@ def difference(first: ArrayLike, second: ArrayLike) -> Difference:
     return Difference(float(first.mean() - second.mean()), float(np.sqrt(sum(squares))))
 
 
-def all_of(answers: Sequence[bool | None]) -> bool | None:
-    """False where any answer is False, else None where any is None, else True."""
-    return False if False in answers else None if None in answers else True
+class Share(NamedTuple):
+    """How many of some independent runs something happened in."""
+
+    number: int
+    of: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Bounds of the probability with `CONFIDENCE` (Wilson 1927)."""
+        n, z = self.of, NORMAL
+        middle, half = self.number + z * z / 2, z * np.sqrt(self.number * (n - self.number) / n + z * z / 4)
+        return float((middle - half) / (n + z * z)), float((middle + half) / (n + z * z))
+
+    @property
+    def usual(self) -> bool | None:
+        """Whether it happens in more than half of all runs; None where the interval has both."""
+        low, high = self.interval
+        return True if low > 0.5 else False if high < 0.5 else None
+
+    def __str__(self) -> str:
+        return f"{self.number} of {self.of} runs ({self.interval[0]:.0%} to {self.interval[1]:.0%})"
+
+
+def opposite(answer: bool | None) -> bool | None:
+    """The answer to the opposite question."""
+    return None if answer is None else not answer
+
+
+def all_of(answers: Sequence[Answer]) -> Answer:
+    """False where any answer is False, else `DEPENDS` where any depends on the reading, else None where any is None, else True."""
+    return next((answer for answer in (False, DEPENDS, None) if answer in answers), True)
+
+
+def by_reading(answers: Mapping[str, bool | None]) -> Answer:
+    """The answer that all readings of the paper give, `DEPENDS` where one says yes and another no, else None."""
+    given = set(answers.values())
+    return DEPENDS if {True, False} <= given else given.pop() if len(given) == 1 else None

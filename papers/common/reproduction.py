@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from papers.common.claims import ANSWERS, all_of
+from papers.common.claims import ANSWERS, DEPENDS, all_of
 from papers.common.plotting import LARGEST
 from papers.common.writing import markdown
 from shadowpuppet.errors import ShadowPuppetError
@@ -96,8 +96,10 @@ def short_warning(results: Sequence[Summary]) -> str:
 def count(results: Sequence[Summary]) -> str:
     """A sentence on how many claims hold."""
     same = [claim["same"] for result in results for claim in result["claims"]]
-    return (f"Of {len(same)} conclusions {same.count(True)} are the same here, {same.count(False)} are not, and for {same.count(None)} the "
-            "runs are inconclusive. The criterion for 'the same' is stated in each row, and the answer is computed.")
+    depends = f"{n} depend{'s' * (n == 1)} on how the paper is read, " if (n := same.count(DEPENDS)) else ""
+    return (f"Of {len(same)} conclusions {same.count(True)} are the same here, {same.count(False)} are not, {depends}and for "
+            f"{same.count(None)} the runs are inconclusive. The criterion for 'the same' is stated in each row, and the answer is "
+            "computed.")
 
 
 def claims(folders: Sequence[Sequence[Summary]]) -> str:
@@ -126,10 +128,13 @@ def recordings(results: Sequence[Summary]) -> str:
 
 
 def contradictions(results: Sequence[Summary]) -> str:
-    """List of the claims that our runs contradict."""
-    lines = [f"- *{claim['claim']}* ({claim['where']}): {claim['got']}; see [`{result['name']}`](#{anchor(result)})."
-             for result in results for claim in result["claims"] if claim["same"] is False]  # fmt: skip
-    return "\n\n".join(["**Where our runs contradict the paper:**", "\n".join(lines)]) if lines else ""
+    """Lists of the claims that our runs contradict, and of those whose answer depends on the reading."""
+    parts = []
+    for answer, title in ((False, "Where our runs contradict the paper"), (DEPENDS, "Where the answer depends on how the paper is read")):
+        lines = [f"- *{claim['claim']}* ({claim['where']}): {claim['got']}; see [`{result['name']}`](#{anchor(result)})."
+                 for result in results for claim in result["claims"] if claim["same"] == answer]  # fmt: skip
+        parts += [f"**{title}:**", "\n".join(lines)] if lines else []
+    return "\n\n".join(parts)
 
 
 def anchor(result: Summary) -> str:

@@ -161,7 +161,7 @@ print(f"states before: {np.unique(s).tolist()}, drawn: {np.unique(drawn_state).t
 # %%
 cloud = make_cloud(surface.points, surface.normals, surface.weights)
 origins = skeleton.forward(proposed[:1])[0]
-tau, epsilon = settings.surface.tau, settings.surface.epsilon
+tau, epsilon, bound = settings.surface.tau, settings.surface.epsilon, settings.forces.coarse_tau
 
 
 def closest_on_cylinders(points):
@@ -182,7 +182,7 @@ on_model, outward = closest_on_cylinders(surface.points)
 pull = surface.points - on_model
 distance = np.linalg.norm(pull, axis=1, keepdims=True)
 m_F = np.maximum((outward * surface.normals).sum(1, keepdims=True), 0)
-forces = np.minimum(m_F * distance, tau) * pull / np.maximum(distance, 1e-9)  # eq. 32
+forces = np.minimum(m_F * distance, bound) * pull / np.maximum(distance, 1e-9)  # eq. 32
 
 
 def bones(panel, pose, colour, **how):
@@ -205,10 +205,11 @@ axes[0, 1].set_title("V-B: forces on one of them", fontsize=9)
 # %% [markdown]
 # ## Step 4: refinement
 #
-# All forty proposals are moved by their forces, iteration by iteration (`Refiner.forces`).
+# All forty proposals are moved by their forces, iteration by iteration, until these balance (`Refiner.forces`): the first half of the
+# iterations with a coarse bound of the forces, the second with a fine one.
 
 # %%
-refiner, iterations = tracker.refiner, (0, 1, 2, 5, 10, 20, 40)
+refiner, iterations = tracker.refiner, (0, 2, 5, 10, 20, 40, 80)
 refined = [refiner.forces(proposed, cloud, ForceSettings(iterations=n)) for n in iterations]
 for n, poses in zip(iterations, refined):
     error = 1000 * np.linalg.norm(body.points(poses) - body.points(truth[None]), axis=2).mean(1)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from papers.common.experiment import Experiment
 from papers.common.runner import main as run_main
-from papers.ni2008 import figure_4, figure_5, figure_6, figure_7, figure_8, models, particles, table_1, table_2
+from papers.ni2008 import choices, figure_4, figure_5, figure_6, figure_7, figure_8, models, particles, table_1, table_2
 
 ABOUT = ("Ni, Kassim and Winkler 2008: walking, jogging and boxing before seven cameras. Without --recording, recordings like HumanEva's "
          "are made first, some five minutes each on a core, once; --drawn does without films.")
@@ -20,11 +20,12 @@ EXPERIMENTS = (
     Experiment("table_1", "Table I: training and testing sizes", "a minute to read the films, once", table_1.make),
     Experiment("figure_4", "Fig. 4: reconstruction error against the number of regions", "10 s", figure_4.make, runs=5),
     Experiment("figure_5", "Fig. 5: estimated pose over the true one", "a minute", figure_5.make),
-    Experiment("figure_6", "Fig. 6: joint angles beside the true ones", "a minute", figure_6.make),
+    Experiment("figure_6", "Fig. 6: joint angles beside the true ones", "3 minutes", figure_6.make, runs=3),
     Experiment("figure_7", "Fig. 7: RMSE of joint angles and positions", "2 minutes", figure_7.make, runs=3),
     Experiment("figure_8", "Fig. 8: RMSE against the number of regions", "10 minutes", figure_8.make, runs=2),
-    Experiment("table_2", "Table II and Fig. 9: hybrid, image force and particle filter", "5 minutes", table_2.make, runs=3),
-    Experiment("particles", "VII: how many particles a plain filter needs", "8 minutes", particles.make),
+    Experiment("table_2", "Table II and Fig. 9: hybrid, image force and particle filter", "25 minutes", table_2.make, runs=10),
+    Experiment("choices", "What the paper leaves open: bounds of the forces, noise of the particle filters", "8 minutes", choices.make),
+    Experiment("particles", "VII: how many particles a plain filter needs", "20 minutes", particles.make, runs=2),
 )
 
 

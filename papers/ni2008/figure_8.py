@@ -60,6 +60,8 @@ def verdicts(curves: Curves) -> list[Verdict]:
                      for motion, each in mean.items())
     beyond = {motion: max((each[M] / each[REGIONS] - 1 for M in each if M > REGIONS), key=abs) for motion, each in mean.items()
               if REGIONS in each and max(each) > REGIONS}  # fmt: skip
+    flat = [answer for each in curves.values() if REGIONS in each for M in each if M > REGIONS for answer in level(each[M], each[REGIONS])]
+    good = [answer for each in curves.values() for answer in near_best(each)]
     worst = {motion: max(chosen) / min(each.values()) - 1 for motion, each in mean.items()
              if (chosen := [value for M, value in each.items() if RANGE[0] <= M <= RANGE[1]])}
     return [
@@ -68,11 +70,25 @@ def verdicts(curves: Curves) -> list[Verdict]:
                 "figure_8.png"),
         Verdict(f"Beyond M = {REGIONS} the tracking error is flat", "VI, Fig. 8", "with more it changes, at most, by "
                 + ", ".join(f"{motion} {share:+.0%}" for motion, share in beyond.items()) + f" (flat: under {LEVEL:.0%})",
-                all(abs(share) < LEVEL for share in beyond.values()) if beyond else None, "figure_8.png"),
+                all_of(flat) if flat else None, "figure_8.png"),
         Verdict("A good choice of M is 10 to 20", "VI, Fig. 8", "largest excess over the least error of any M: "
                 + ", ".join(f"{share:+.0%}" for share in worst.values()) + f" (good: under {GOOD:.0%})",
-                all(share < GOOD for share in worst.values()) if worst else None, "figure_8.png"),
+                all_of(good) if good else None, "figure_8.png"),
     ]  # fmt: skip
+
+
+def level(many: list[Errors], few: list[Errors]) -> list[bool | None]:
+    """Whether the error with `many` regions is neither more nor less than with `few`, by the runs."""
+    (first, second), limit = ([one.rmse for one in each] for each in (many, few)), LEVEL * float(np.mean([one.rmse for one in few]))
+    return [difference(first, second).under(limit), difference(second, first).under(limit)]
+
+
+def near_best(each: dict[int, list[Errors]]) -> list[bool | None]:
+    """Whether the error of each choice in `RANGE` is near the least, by the runs."""
+    rmse = {M: [one.rmse for one in errors] for M, errors in each.items()}
+    least = min(rmse, key=lambda M: float(np.mean(rmse[M])))
+    return [True if least == M else difference(rmse[M], rmse[least]).under(GOOD * float(np.mean(rmse[least])))
+            for M in rmse if RANGE[0] <= M <= RANGE[1]]  # fmt: skip
 
 
 def falls(each: dict[int, list[Errors]]) -> bool | None:

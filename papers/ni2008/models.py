@@ -97,14 +97,14 @@ def figure_2(request: Request) -> Outcome:
     foot, normal = near.feet[0], near.normals[0]
     away = point - foot
     cosine = float(normal @ away / np.linalg.norm(away))
-    force = away / np.linalg.norm(away) * min(cosine * float(np.linalg.norm(away)), settings.surface.tau)
+    force = away / np.linalg.norm(away) * min(cosine * float(np.linalg.norm(away)), settings.forces.fine_tau)
     moment = np.cross(foot - elbow[:3, 3], force)
     plane = np.stack([along, across])
     figure = _force_picture(limbs, s, plane @ (point - elbow[:3, 3]), plane @ (foot - elbow[:3, 3]), plane @ force)
     rows = [(name, *map(float, value)) for name, value in (("P", point), ("P'", foot), ("c", elbow[:3, 3]), ("F", force), ("M", moment))]
-    told = {"point_m": list(POINT), "tau_m": settings.surface.tau}
+    told = {"point_m": list(POINT), "tau_m": settings.forces.fine_tau}
     return Outcome(told, {"figure_2": figure}, {"figure_2": Table(("what", "x", "y", "z"), rows, True)},
-                   said=[told_of(away, settings.surface.tau, moment)])  # fmt: skip
+                   said=[told_of(away, settings.forces.fine_tau, moment)])  # fmt: skip
 
 
 def told_of(away: Array, tau: float, moment: Array) -> str:

@@ -14,7 +14,6 @@ from papers.ni2008.inputs import BODY, Source
 from shadowpuppet.body.models import make_body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import RecordingError, TrackingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.motion_files import read_motion
@@ -25,7 +24,10 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.rig import open_rig, read_frames
 from shadowpuppet.pipeline.survey.rig import survey_rig
+from shadowpuppet.synthetic.person.clothes import Clothes
+from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.mannequin import JOINTS
+from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 from shadowpuppet.tracking.multiview.size_estimation import estimate_sizes, size_deviations
@@ -61,21 +63,18 @@ def read(source: Source) -> tuple[tuple[Camera, ...], dict[str, NDArray[Any]]]:
 
 
 def drawn(source: Source) -> tuple[tuple[Camera, ...], dict[str, NDArray[Any]]]:
-    """A spec's motion by the anatomical body, whose silhouettes are drawn: seconds in place of minutes, and no model is tracked with its
-    own shape."""
+    """A spec's made person as exact silhouettes, without films: a minute in place of several."""
     spec = source.spec
     assert spec is not None
     for_motion, for_training = np.random.default_rng(spec.seed).spawn(2)
-    tables = []
-    for chance, frames in ((for_motion, spec.frames), (for_training, spec.training_frames)):
-        times, figure = perform(replace(spec, frames=frames), chance)
-        tables.append(JointTable(times, JOINTS, figure.joints))
-    film = fit_poses(tables[0], "anatomical")
-    again = fit_poses(tables[1], "anatomical", film.sizes)
+    times, figure = perform(spec, for_motion)
+    own = spec.motion if spec.training is None else spec.training
+    again, rehearsal = perform(replace(spec, motion=own, frames=spec.training_frames), for_training)
     cameras = tuple(_smaller(view.camera(), source.factor) for view in spec.views())
-    pictures = [Picture(film.body, camera, camera.T_camera_world) for camera in cameras]
-    seen = (Seen(float(time), [picture.mask(pose) for picture in pictures]) for time, pose in zip(film.times, film.poses))
-    truth, training = (JointTable(fit.times, fit.body.landmark_names, fit.body.points(fit.poses)) for fit in (film, again))
+    clothes = Clothes.draw(np.random.default_rng(spec.scene.clothing))
+    people = [PersonRenderer(camera, dressed(spec.body, clothes), clothes, np.zeros((3, 4))) for camera in cameras]
+    seen = (Seen(float(time), [person.mask(figure, n) for person in people]) for n, time in enumerate(times))
+    truth, training = JointTable(times, JOINTS, figure.joints), JointTable(again, JOINTS, rehearsal.joints)
     return cameras, _arrays(cameras, spec.rate, seen, truth, training, OPENED if source.factor == 1 else FEW)
 
 

@@ -25,18 +25,15 @@ from shadowpuppet.motion.prior.training import modelled
 from shadowpuppet.motion.prior.vqpca import PriorFit, fit_prior
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
-from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
+from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.particle_filter import Particles
 
 METHODS = ("shadowpuppet.tracking.multiview.tracker", "shadowpuppet.motion.prior.vqpca", "shadowpuppet.motion.prior.training")
 """What runs depend on beside this file and the case, whose name has a key of its own: a change elsewhere leaves them as they are."""
 REGIONS, DIMENSIONS = 20, 3
 """M and m of Table II's hybrid."""
-ITERATIONS = 160
-"""Of the image force: its frame takes an eighth to a fifth of the hybrid's in Table II, with a fortieth of the particles, so that each gets
-some eight times the 20 iterations of a hybrid's particle."""
-PLAIN = {"modulated": False, "robust": False, "iterations": ITERATIONS}
-"""Forces as those of ref. [11]: no normals, no bound. Its dynamics, too, pass a force on along the limbs, which here are the sums over what
-hangs on a joint; with these left out each joint feels its own part alone."""
+START_ROTATION, START_TRANSLATION = 0.05, 0.01
+"""Noise (rad, m) of the pose that the search finds in the first frame: a method without chance has distinct runs then."""
 
 
 @dataclass(frozen=True)
@@ -48,23 +45,49 @@ class Way:
     """Beside the preset's, `ni2008`."""
     regions: int = REGIONS
     """M of the motion prior, where there is one."""
+    from_truth: bool = False
+    """Whether every frame begins at the true pose: no tracker, but what the method makes of the best start."""
 
     @property
     def plain(self) -> dict[str, Any]:
         """For files."""
-        return {"settings": dict(self.settings), "regions": self.regions}
+        return {"settings": dict(self.settings), "regions": self.regions} | ({"from_truth": True} if self.from_truth else {})
 
 
 HYBRID = Way("hybrid")
-IMAGE_FORCE = Way("image force", {"method": "image_force", "velocity": 0.0, "forces": PLAIN})
-ALONE = Way("image force, each joint alone", {"method": "image_force", "velocity": 0.0, "forces": PLAIN | {"hierarchical": False}})
+ONE = {"method": "image_force", "velocity": 0.0}
+ICP = {"modulated": False, "robust": False, "iterations": 160, "balance": 0.0}
+"""Forces as those of ref. [11]: no normals, no bound. Its dynamics, too, pass a force on along the limbs, which here are the sums over what
+hangs on a joint; with these left out each joint feels its own part alone. Iterations: in Table II the image force's frame takes an eighth
+to a fifth of the hybrid's, with a fortieth of the particles."""
+IMAGE_FORCES = (
+    Way("image force, ICP", {**ONE, "forces": ICP}),
+    *(Way(f"image force, {n} iterations", {**ONE, "forces": {"iterations": n}}) for n in (12, 40)),
+    Way("image force, balanced", ONE),
+)
+"""Readings of "an image force/ICP based method similar to [11]" (VII): plain ICP, or the paper's own forces, with so many iterations or
+until they balance."""
+ALONE = Way("image force, each joint alone", {**ONE, "forces": ICP | {"hierarchical": False}})
+FORCES_FROM_TRUTH = Way("forces from the true pose", ONE, from_truth=True)
+"""What the forces make of true poses: where they leave them, body and forces are right."""
 
 
-def particle_filter(particles: int = 1000) -> Way:
-    """The plain one: noise in all degrees of freedom, neither prior nor refinement. The paper does not say how much; of 0.02, 0.035, 0.05
-    and 0.1 rad, 0.035 was best on the first 80 frames of the made walking."""
-    noise = {"sigma_rotation": 0.035, "sigma_heading": 0.03, "sigma_translation": 0.01}
+def particle_filter(particles: int = 1000, sigma: float = 0.035) -> Way:
+    """The plain one: noise in all degrees of freedom, `sigma` rad in angles, neither prior nor refinement. The paper does not say how much
+    noise: `choices` does."""
+    noise = {"sigma_rotation": sigma, "sigma_heading": sigma, "sigma_translation": 0.3 * sigma}
     return Way("particle filter", {"method": "particle_filter", "particles": particles, **noise})
+
+
+CYCLES, COOLING = 10, 0.7
+"""Of the annealed filter (Deutscher et al. 2000, the paper's ref. [14], has ten layers). Ten times a tenth of the particles are as many
+weighings as the plain filter's."""
+
+
+def annealed(particles: int = 1000, sigma: float = 0.1) -> Way:
+    """The same with the particles spent over cycles of less and less noise; `sigma` of the first."""
+    settings = particle_filter(particles, sigma).settings
+    return Way("particle filter, annealed", {**settings, "particles": particles // CYCLES, "cycles": CYCLES, "cooling": COOLING})
 
 
 def hybrid(regions: int = REGIONS, particles: int = 40) -> Way:
@@ -145,13 +168,30 @@ def follow(case: Case, way: Way, seed: int) -> Track:
         points, masks = case.points(frame), case.masks(frame)
         start = time.process_time()
         if state is None:
-            state = searching.start(rng, points, masks)
+            state = disturbed(rng, tracker, searching.start(rng, points, masks))
         elif len(points.points):
+            state = placed(state, case.true_poses[frame]) if way.from_truth else state
             state = tracker.cycle(rng, state, MultiviewObservation(tracker.views, points, masks))
         seconds.append(time.process_time() - start)
         poses.append(state.pose)
         overlap.append(state.overlap)
     return Track(np.array(poses), np.array(seconds), np.array(overlap))
+
+
+def disturbed(rng: np.random.Generator, tracker: MultiviewTracker, state: MultiviewState) -> MultiviewState:
+    """The first state with all poses moved by one and the same noise."""
+    skeleton = tracker.body.skeleton
+    sigma = np.array([START_TRANSLATION if dof.kind == "translation" else START_ROTATION for dof in skeleton.dofs])
+    noise, particles = sigma * rng.standard_normal(len(sigma)), state.particles
+    return state._replace(pose=skeleton.clamp(state.pose[None] + noise)[0],
+                          particles=particles._replace(poses=skeleton.clamp(particles.poses + noise)))
+
+
+def placed(state: MultiviewState, pose: Array) -> MultiviewState:
+    """The state with one particle, at a pose (D,); as it is where the pose is not known."""
+    if not np.isfinite(pose).all():
+        return state
+    return state._replace(pose=pose, particles=Particles(pose[None], np.zeros(1), np.zeros(1)))
 
 
 def learn(case: Case, regions: int, seed: int) -> PriorFit:

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from papers.common import plotting, reproduction, sources
-from papers.common.claims import Verdict, all_of, difference
+from papers.common.claims import DEPENDS, Share, Verdict, all_of, by_reading, difference, opposite
 from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.many import run_all
 from papers.common.plotting import label, new_figure, save_picture
@@ -83,16 +83,39 @@ def test_single_runs_tell_nothing():
     assert difference([math.nan, 1.0], [1.0, 2.0]).greater is None
 
 
-@pytest.mark.parametrize(("answers", "expected"), [((True, True), True), ((True, None), None), ((None, False), False), ((), True)])
+@pytest.mark.parametrize(("answers", "expected"), [
+    ((True, True), True), ((True, None), None), ((None, False), False), ((), True), ((None, DEPENDS, True), DEPENDS),
+    ((DEPENDS, False), False)])  # fmt: skip
 def test_all_of(answers, expected):
     assert all_of(answers) is expected
 
 
+@pytest.mark.parametrize(("answers", "expected"), [
+    ((True, True), True), ((False, False), False), ((None, None), None), ((True, None), None), ((False, None), None),
+    ((True, False), DEPENDS), ((True, None, False), DEPENDS)])  # fmt: skip
+def test_an_answer_depends_on_the_reading_where_one_says_yes_and_another_no(answers, expected):
+    assert by_reading(dict(enumerate(answers))) == expected
+
+
+def test_shares_have_the_intervals_of_wilson():
+    # scipy.stats.binomtest(k, n).proportion_ci(0.9, "wilson")
+    for number, of, low, high in ((0, 10, 0.0, 0.2129), (5, 10, 0.2693, 0.7307), (1, 1, 0.2699, 1.0), (3, 3, 0.5258, 1.0)):
+        np.testing.assert_allclose(Share(number, of).interval, (low, high), atol=2e-4)
+    assert [Share(number, 3).usual for number in (0, 1, 2, 3)] == [False, None, None, True]
+    assert opposite(Share(0, 3).usual) is True
+    assert opposite(Share(1, 2).usual) is None
+
+
+def test_a_limit_counts_by_two_standard_errors():
+    apart = difference([10.0, 10.2], [8.0, 8.2])  # 2 with an error of 0.141
+    assert (apart.under(2.3), apart.under(2.2), apart.under(1.7)) == (True, None, False)
+
+
 def test_the_claims_table_says_yes_no_and_inconclusive():
-    rows = [Verdict("c", "V", "1 mm", same) for same in (True, False, None)]
+    rows = [Verdict("c", "V", "1 mm", same) for same in (True, False, None, DEPENDS)]
     lines = claims_table(rows).splitlines()
     assert lines[0] == "| paper said | where | we got | same conclusion? |"
-    assert [line.split("|")[4].strip() for line in lines[2:]] == ["yes", "**no**", "inconclusive"]
+    assert [line.split("|")[4].strip() for line in lines[2:]] == ["yes", "**no**", "inconclusive", "depends on the reading"]
 
 
 # Tables and pictures

@@ -269,18 +269,36 @@ def anatomical(sizes: AnatomicalSizes) -> Body:
                  _landmarks(sizes, ("chest", sizes.thorax_height)) | _soles(sizes))
 
 
+TORSO_FORWARD, SOLE_SHARE = 0.1, 0.75
+"""Of `cylinders`: how far the torso's axis lies before pelvis and neck, as a share of its depth; how far below the ankle a lower leg ends,
+which is foot too, as a share of the ankle's height."""
+LEANING: dict[str, Pair] = {"head": (0.2, 0.0), "upper_arm": (0.0, 0.2), "lower_arm": (0.2, -0.4), "upper_leg": (-0.15, 0.0),
+                            "lower_leg": (0.25, 0.0)}  # fmt: skip
+"""How far before and outside the bone the far ends of the other cylinders lie, as shares of their widths: flesh is not centred on bones, a
+lower leg has a foot in front, the fingers of a lower arm curl inward. Chosen on made people, so that the forces move true poses little
+(`python -m papers.ni2008 choices` tells by how much)."""
+
+
 def cylinders(sizes: CylinderSizes) -> Body:
-    """25 DOF, ten cylinders with flat ends, the torso's elliptic, the others circular (Ni 2008, II). Lower legs end at the soles."""
+    """25 DOF, ten cylinders with flat ends, the torso's elliptic, the others circular (Ni 2008, II). Each begins at its joint and leans
+    away from the bone by `LEANING`."""
     s = sizes
-    torso = (s.trunk_depth / 2, s.trunk_width / 2)
-    parts = [_Limb("torso", "pelvis", "up", (-s.hip_drop - 0.3 * s.trunk_depth, s.trunk_height - 0.3 * s.shoulder_drop), (torso, torso))]
-    tubes = [("head", "head", (0.0, s.neck_length + s.head_height), s.head_width)]
+    torso, before = (s.trunk_depth / 2, s.trunk_width / 2), TORSO_FORWARD * s.trunk_depth
+    parts = [_Limb("torso", "pelvis", "up", (-s.hip_drop - 0.3 * s.trunk_depth, s.trunk_height), (torso, torso), (before, before))]
+    parts += [_tube("head", "head", (0.0, s.neck_length + s.head_height), s.head_width)]
     for side in SIDES:
-        tubes += [(f"{side}_upper_arm", f"{side}_shoulder", (-0.3 * s.upper_arm_width, s.upper_arm_length), s.upper_arm_width),
-                  (f"{side}_lower_arm", f"{side}_elbow", (0.0, s.forearm_length + s.hand_length), s.forearm_width)]
+        parts += [_tube(f"{side}_upper_arm", f"{side}_shoulder", (-0.3 * s.upper_arm_width, s.upper_arm_length), s.upper_arm_width),
+                  _tube(f"{side}_lower_arm", f"{side}_elbow", (0.0, s.forearm_length + s.hand_length), s.forearm_width)]
     for side in SIDES:
-        tubes += [(f"{side}_upper_leg", f"{side}_hip", (0.0, s.thigh_length), s.thigh_width),
-                  (f"{side}_lower_leg", f"{side}_knee", (0.0, s.shank_length + s.ankle_height), s.shank_width)]
-    parts += [_Limb(part, joint, "up" if joint == "head" else "down", reach, (_section(width), _section(width)))
-              for part, joint, reach, width in tubes]
+        parts += [_tube(f"{side}_upper_leg", f"{side}_hip", (0.0, s.thigh_length), s.thigh_width),
+                  _tube(f"{side}_lower_leg", f"{side}_knee", (0.0, s.shank_length + SOLE_SHARE * s.ankle_height), s.shank_width)]
     return _body("cylinders", cylinder_skeleton(sizes), parts, _landmarks(sizes, ("pelvis", sizes.trunk_height)))
+
+
+def _tube(part: str, joint: str, reach: Pair, width: float) -> _Limb:
+    """A round cylinder; the y axis of a hanging limb points to the right."""
+    side, _, kind = part.partition("_")
+    forward, outside = LEANING[kind or part]
+    right = -outside if side == "left" else outside
+    return _Limb(part, joint, "up" if part == "head" else "down", reach, (_section(width), _section(width)), (0.0, forward * width),
+                 aside=(0.0, right * width))

@@ -6,7 +6,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array, inverse
-from shadowpuppet.synthetic.compositing import Layer
+from shadowpuppet.synthetic.compositing import FAR, Layer
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.kinematics import Figure
 from shadowpuppet.synthetic.person.mannequin import JOINTS
@@ -50,6 +50,19 @@ class PersonRenderer:
         """The figure in its posture `index`."""
         from shadowpuppet.synthetic import _ray_marching
 
+        traced, depth, near = self._traced(figure, index)
+        alpha, picture = np.zeros(depth.shape), np.zeros((*depth.shape, 3))
+        _ray_marching.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, EDGE_SAMPLES, picture, alpha)
+        return Layer(picture, alpha, depth)
+
+    def mask(self, figure: Figure, index: int) -> np.ndarray:
+        """The exact silhouette (H, W) of the figure in its posture `index`, as `draw` has it, without colours."""
+        return self._traced(figure, index)[1] < FAR
+
+    def _traced(self, figure: Figure, index: int) -> tuple[tuple, Array, np.ndarray]:
+        """What the kernels need of the figure in a posture; depth (H, W) of its surface, and the nearest part (H, W)."""
+        from shadowpuppet.synthetic import _ray_marching
+
         s, (width, height), eye = self.surface, self.camera.size, self.camera.centre
         R, o = figure.rotation[index, s.segment], figure.origin[index, s.segment]
         axes, origin = R @ s.frame, o + (R @ s.start[..., None])[..., 0]
@@ -62,9 +75,7 @@ class PersonRenderer:
         traced = eye, self.rays, self.across, lists, span, placed, self.table, s.code, self._joins(figure, index)
         depth, near = np.empty((height, width)), np.empty((height, width), np.int64)
         _ray_marching.find_surface(*traced, depth, near)
-        alpha, picture = np.zeros((height, width)), np.zeros((height, width, 3))
-        _ray_marching.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, EDGE_SAMPLES, picture, alpha)
-        return Layer(picture, alpha, depth)
+        return traced, depth, near
 
     def _joins(self, figure: Figure, index: int) -> Array:
         """Where each of `GROUPS` blends into the trunk, and the radius, of shape (5, 4), metres."""

@@ -106,8 +106,8 @@ class MultiCase:
         return self.hull.points(self.silhouettes)
 
     def run_forces(self, iterations: int) -> Array:
-        """All poses after some iterations of simulated forces."""
-        return self.refiner.forces(self.poses, self.cloud, ForceSettings(iterations=iterations))
+        """All poses after just so many iterations of simulated forces."""
+        return self.refiner.forces(self.poses, self.cloud, ForceSettings(iterations=iterations, balance=0.0))
 
     def run_gauss_newton(self, iterations: int) -> Array:
         """All poses after some iterations of Gauss-Newton."""

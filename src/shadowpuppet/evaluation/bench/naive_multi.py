@@ -169,7 +169,7 @@ def _limbs(body: Body) -> Limbs:
 def move_by_forces(
     body: Body, pose: Array, points: Array, normals: Array, weights: Array, surface: SurfaceSettings, settings: ForceSettings
 ) -> Array:
-    """The pose (D,) after one iteration of simulated force and moment (eqs. 32-41).
+    """The pose (D,) after one iteration of simulated force and moment (eqs. 32-41), with the fine bound.
 
     Forces are divided by the number of points, moments by the points' inertia about the axis, so that the step does not depend on their
     number. The paper leaves this to its weights lambda and rho.
@@ -179,7 +179,7 @@ def move_by_forces(
     pull = points - found.feet
     apart = np.linalg.norm(pull, axis=1) + 1e-9
     size = apart * (np.maximum((found.normals * normals).sum(1), 0) if settings.modulated else 1)  # m_F
-    size = np.minimum(size, surface.tau) if settings.robust else size  # rho
+    size = np.minimum(size, settings.fine_tau) if settings.robust else size  # rho
     forces = (weights * size / apart)[:, None] * pull  # eq. 32
     owner, step = np.asarray(limbs.joints)[which], np.zeros(len(pose))
     for d, dof in enumerate(body.skeleton.dofs):

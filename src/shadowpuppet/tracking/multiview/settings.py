@@ -69,8 +69,14 @@ class GaussNewtonSettings:
 class ForceSettings:
     """Refinement by simulated force and moment (Ni 2008, eqs. 32-41)."""
 
-    iterations: Annotated[int, Field(ge=0, le=1000)] = 20
-    """Number of iterations."""
+    iterations: Annotated[int, Field(ge=0, le=1000)] = 80
+    """Largest number of iterations: half of them with the coarse bound, the others with the fine one."""
+    coarse_tau: Positive = 0.1
+    """Upper bound (m) of a point's force, until the forces balance for the first time."""
+    fine_tau: Positive = 0.03
+    """Upper bound (m) of a point's force after that, until they balance again."""
+    balance: NonNegative = 0.001
+    """The forces balance when no degree of freedom moves by more than this (m or rad) in an iteration."""
     translation: Positive = 1.0
     """Gain of the root's translation; 1 moves it by the mean force (m)."""
     rotation: Positive = 0.5

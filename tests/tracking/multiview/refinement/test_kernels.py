@@ -44,7 +44,7 @@ def test_costs_are_those_of_the_plain_version(seen, epsilon, choice, rng):
 def test_forces_move_a_pose_as_in_the_plain_version(seen, choice, chosen):
     body, pose, *cloud = seen
     surface = replace(SURFACE, nearest=choice)
-    forces = ForceSettings(iterations=2, **chosen)
+    forces = ForceSettings(iterations=2, coarse_tau=surface.tau, fine_tau=surface.tau, **chosen)
     plain = pose
     for _ in range(2):
         plain = naive.move_by_forces(body, plain, *cloud, surface, forces)

@@ -11,10 +11,11 @@ from shadowpuppet.tracking.multiview.refinement.part_sums import add_descendants
 
 
 @kernel
-def push(poses, bounded, modulated, hierarchical, gains, iterations, chain, limbs, rows, spheres, origin, numbers, which, room,
+def push(poses, bounded, modulated, hierarchical, gains, balance, iterations, chain, limbs, rows, spheres, origin, numbers, which, room,
          vectors):  # pragma: no cover
-    """Move poses (N, D), in place, by `iterations` of forces and moments, as `Refiner.forces` describes. Without `hierarchical` only the
-    forces on parts fixed to a joint move it; the root is translated by the forces on all parts in either case."""
+    """Move poses (N, D), in place, by forces and moments until these balance, with at most so many `iterations`, as `Refiner.forces`
+    describes. Without `hierarchical` only the forces on parts fixed to a joint move it; the root is translated by the forces on all parts
+    in either case."""
     T, screws, work, sums, force = room[1], room[2], room[3], room[6], vectors[1, :4]
     for n in range(poses.shape[0]):
         for _ in range(iterations):
@@ -27,7 +28,9 @@ def push(poses, bounded, modulated, hierarchical, gains, iterations, chain, limb
                     force[k] += sums[j, 3 + k]
             if hierarchical:
                 add_descendants(chain, sums)  # eqs. 39, 40: a joint turns by the moments on all parts below it
-            _move_joints(poses[n], chain, T, screws, origin, sums, force, gains, vectors[0])  # eqs. 34, 35, 41
+            moved = _move_joints(poses[n], chain, T, screws, origin, sums, force, gains, vectors[0])  # eqs. 34, 35, 41
+            if moved <= balance:
+                break
 
 
 @kernel
@@ -84,8 +87,9 @@ def _add_forces(q, number, rows, near, tau, bounded, modulated, out, lanes):  # 
 
 @device
 def _move_joints(pose, chain, T, screws, origin, sums, force, gains, step):  # pragma: no cover
-    """Move a pose (D,) by the force on its root and the moments about its joints. The paper's weights rho and lambda are here the gain
-    divided by the mass or inertia of the points that act, so that a step does not depend on their number."""
+    """Move a pose (D,) by the force on its root and the moments about its joints; returns the largest change of a degree of freedom. The
+    paper's weights rho and lambda are here the gain divided by the mass or inertia of the points that act, so that a step does not depend
+    on their number."""
     for d in range(pose.size):
         own, joint, s = sums[chain.owners[d]], T[chain.owners[d]], screws[d]
         mass = own[6] + 1e-9
@@ -104,5 +108,9 @@ def _move_joints(pose, chain, T, screws, origin, sums, force, gains, step):  # p
         along = s[0] * (xx * s[0] + 2 * xy * s[1] + 2 * xz * s[2]) + s[1] * (yy * s[1] + 2 * yz * s[2]) + s[2] * zz * s[2]
         inertia = (xx + yy + zz) * length - along
         step[d] = gains[1] * (m0 * s[0] + m1 * s[1] + m2 * s[2]) / (inertia + 1e-4 * mass)  # eq. 35
+    moved = 0.0
     for d in range(pose.size):
-        pose[d] = min(max(pose[d] + min(max(step[d], -MAX_STEP), MAX_STEP), chain.low[d]), chain.high[d])  # eq. 41
+        last = pose[d]
+        pose[d] = min(max(last + min(max(step[d], -MAX_STEP), MAX_STEP), chain.low[d]), chain.high[d])  # eq. 41
+        moved = max(moved, abs(pose[d] - last))
+    return moved

@@ -86,11 +86,14 @@ class Refiner:
         return poses
 
     def forces(self, poses: Array, cloud: Cloud, settings: ForceSettings) -> Array:
-        """Poses (N, D) after `settings.iterations` of simulated force and moment (eqs. 32-41), within limits."""
-        poses = self.body.skeleton.checked(poses).copy()
-        gains = settings.translation, settings.rotation
-        push(poses, settings.robust, settings.modulated, settings.hierarchical, gains, settings.iterations, self._chain, self._limbs,
-             cloud.rows, cloud.spheres, cloud.origin, self._numbers(), self._which(cloud), self._room(), self._system()[2])
+        """Poses (N, D) moved by simulated force and moment (eqs. 32-41), within limits, until these balance: first with the coarse, then
+        with the fine bound of the forces."""
+        poses, s = self.body.skeleton.checked(poses).copy(), settings
+        half = s.iterations // 2
+        for tau, iterations in ((s.coarse_tau, half), (s.fine_tau, s.iterations - half)):
+            push(poses, s.robust, s.modulated, s.hierarchical, (s.translation, s.rotation), s.balance, iterations, self._chain,
+                 self._limbs, cloud.rows, cloud.spheres, cloud.origin, self._numbers(tau), self._which(cloud), self._room(),
+                 self._system()[2])
         return poses
 
     def _numbers(self, tau: float | None = None) -> tuple[np.float32, ...]:
