@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.tracking.frozen import FROZEN_FRAMES, CameraWatch, is_frozen, same_silhouette
+from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 
 RATE = 20
 
@@ -37,6 +38,21 @@ def test_a_camera_that_freezes_is_set_aside_by_name_and_taken_back():
     assert (interval.camera, interval.why) == (1, "frozen")
     assert interval.begin <= 11 / RATE < interval.end == pytest.approx(24 / RATE)
     assert interval.frames == round((interval.end - interval.begin) * RATE) + 1
+
+
+def test_a_frozen_camera_is_noticed_although_others_add_to_its_silhouette():
+    """Limbs that a camera takes for shadow change with what the others see."""
+    watch, aside = RigWatch(3), []
+    for n in range(25):
+        own = [person(n), person(5 if n >= 5 else n), person(n)]
+        masks = [own[0], own[1] | person(n + 3), own[2]]
+        kept = watch(n / RATE, masks, own)
+        assert all(a is None or a is b for a, b in zip(kept, masks))
+        aside.append([a is None for a in kept])
+        watch.tracked(())
+    assert aside[-1] == [False, True, False]
+    (interval,) = watch.intervals
+    assert (interval.camera, interval.why) == (1, "frozen")
 
 
 def test_who_stands_still_freezes_no_camera():

@@ -101,6 +101,8 @@ class LiveSession(ABC):
         """`TrackedSubject.lean` of each frame."""
         self._watch: RigWatch | None = None
         """Which of several cameras are set aside."""
+        self._own: tuple[Mask, ...] = ()
+        """Masks (H, W) as each of several cameras has them, before others add to them."""
         self._measured: Callable[[], Any] = lambda: None
 
     @property
@@ -220,7 +222,7 @@ class LiveSession(ABC):
     def _track(self, shot: Any, images: tuple[Image, ...]) -> Outcome:
         assert self.subject is not None
         masks = self._masks(shot, images)
-        observation = self.subject.observe(masks if self._watch is None else self._watch(shot.captured, masks))
+        observation = self.subject.observe(masks if self._watch is None else self._watch(shot.captured, masks, self._own))
         self._state = self.subject.next_state(self.rng, self._state, observation)
         if self._watch is not None:
             self._watch.tracked(self.subject.drawn(self._state))

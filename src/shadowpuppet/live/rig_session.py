@@ -217,6 +217,7 @@ class RigSession(LiveSession):
 
     def _masks(self, shot: SnapshotSet, images: tuple[Image, ...]) -> tuple[Mask, ...]:
         found = [segment(CameraFrame(shot.captured, image, None)) for segment, image in zip(self._segment, images)]
+        self._own = tuple(each.mask for each in found)
         return tuple(mask for mask in self._share(found) if mask is not None)  # each camera has one
 
     def _forget_time(self) -> None:

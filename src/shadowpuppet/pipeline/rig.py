@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import operator
 import time
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -53,6 +54,8 @@ class FrameSet(NamedTuple):
     """Seconds of reading, summed over the cameras."""
     segmenting: float = 0.0
     """Seconds of making silhouettes, likewise."""
+    own: tuple[Mask | None, ...] = ()
+    """Silhouettes (H, W) as each camera's own picture has them; empty where other cameras have added nothing to `masks`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,10 +176,12 @@ def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = F
             if n % every != 1 % every:
                 continue
             start = time.perf_counter()
-            masks = share([part.segmented for part in parts])
+            found = [part.segmented for part in parts]
+            own, masks = unshared(found), share(found)
             sharing = time.perf_counter() - start
             yield FrameSet(moment, tuple(part.image for part in parts), masks,
-                           sum(part.decoding for part in parts), sum(part.segmenting for part in parts) + sharing)
+                           sum(part.decoding for part in parts), sum(part.segmenting for part in parts) + sharing,
+                           () if all(map(operator.is_, own, masks)) else own)
 
 
 class _Part(NamedTuple):

@@ -30,6 +30,10 @@ def film_of(recording: str | Path, settings: Mapping[str, Any]) -> dict[str, Any
     return {"recording": str(Path(recording).resolve()), **{name: settings.get(name) for name in SHARED}}
 
 
+Packed = tuple[NDArray[np.uint8], tuple[int, ...]]
+"""A mask's bits, eight a byte, and its shape (H, W)."""
+
+
 @dataclass
 class MaskStore:
     """Masks of a recording's frame sets, in order, packed to bits; emptied once they exceed the limit."""
@@ -40,31 +44,36 @@ class MaskStore:
     """Size of the stored masks, bytes."""
     complete: bool = False
     """Whether all frame sets of the recording are stored."""
-    sets: list[tuple[float, list[tuple[NDArray[np.uint8], tuple[int, ...]] | None]]] = field(default_factory=list)
-    """For each set its time (s) and, for each camera, the packed mask and its shape (H, W); None for a camera without a mask."""
+    sets: list[tuple[float, list[Packed | None], list[Packed | None]]] = field(default_factory=list)
+    """For each set its time (s) and, for each camera, `FrameSet.masks` and `FrameSet.own`; None for a camera without a mask."""
 
-    def add(self, time: float, masks: Sequence[Mask | None]) -> None:
+    def add(self, time: float, masks: Sequence[Mask | None], own: Sequence[Mask | None] = ()) -> None:
         """Store one frame set's masks."""
         if self.size > self.limit:
             self.sets.clear()
             return
-        packed = [None if mask is None else (np.packbits(mask), mask.shape) for mask in masks]
-        self.sets.append((time, packed))
-        self.size += sum(len(one[0]) for one in packed if one is not None)
+        packed, alone = ([None if mask is None else (np.packbits(mask), mask.shape) for mask in each] for each in (masks, own))
+        self.sets.append((time, packed, alone))
+        self.size += sum(len(one[0]) for one in (*packed, *alone) if one is not None)
 
     def __iter__(self) -> Iterator[FrameSet]:
         """The stored frame sets, without images."""
-        for time, packed in self.sets:
-            masks = (None if one is None else np.unpackbits(one[0], count=int(np.prod(one[1]))).reshape(one[1]).view(np.bool_)
-                     for one in packed)  # fmt: skip
-            yield FrameSet(time, (None,) * len(packed), tuple(masks))
+        for time, packed, alone in self.sets:
+            yield FrameSet(time, (None,) * len(packed), tuple(map(_unpacked, packed)), own=tuple(map(_unpacked, alone)))
 
     def stored(self, frames: Iterable[FrameSet]) -> Generator[FrameSet]:
         """Pass frame sets on, and store their masks."""
         for each in frames:
-            self.add(each.time, each.masks)
+            self.add(each.time, each.masks, each.own)
             yield each
         self.complete = self.size <= self.limit
+
+
+def _unpacked(packed: Packed | None) -> Mask | None:
+    if packed is None:
+        return None
+    bits, shape = packed
+    return np.unpackbits(bits, count=int(np.prod(shape))).reshape(shape).view(np.bool_)
 
 
 class SilhouetteCache:

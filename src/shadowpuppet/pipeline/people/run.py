@@ -144,7 +144,7 @@ class PeopleRun:
         frames = stack.enter_context(closing(read_frames(self.rig, segment, ready=options.masks, every=options.every)))
         try:
             for seen in timer.each("wait", frames):
-                masks = watch(seen.time, seen.masks)
+                masks = watch(seen.time, seen.masks, seen.own)
                 timer.add(decode=seen.decoding, segment=seen.segmenting)
                 with timer.time("hull"):
                     points = group.hull.points(masks)

@@ -19,9 +19,13 @@ class RigWatch:
         self._watch, self._steps = CameraWatch(number), StepWatch(number)
         self._many = number > 1
 
-    def __call__(self, seconds: float, masks: Sequence[Mask | None]) -> tuple[Mask | None, ...]:
-        """The masks (H, W) of a frame set at a time (s), None for a camera without a picture or one that is set aside."""
-        return self._steps(seconds, self._watch(seconds, masks))
+    def __call__(self, seconds: float, masks: Sequence[Mask | None], own: Sequence[Mask | None] = ()) -> tuple[Mask | None, ...]:
+        """The masks (H, W) of a frame set at a time (s), None for a camera without a picture or one that is set aside.
+
+        own: masks as each camera's own picture has them, where other cameras have added to `masks`. A frozen picture's stay alike.
+        """
+        kept = self._steps(seconds, self._watch(seconds, own or masks))
+        return tuple(None if of_own is None else mask for of_own, mask in zip(kept, masks, strict=True))
 
     def tracked(self, drawn: Sequence[Bits]) -> None:
         """The body of the first frame set that has none yet, as `StepWatch.tracked` expects it."""
