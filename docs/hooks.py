@@ -26,7 +26,7 @@ import tomli_w
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.settings import settings_of
 from shadowpuppet.synthetic.spec import TABLES, Spec
-from shadowpuppet.tracking.monocular.settings import PRESETS
+from shadowpuppet.tracking.monocular.settings import INITIALIZATION_PRESETS, PRESETS
 from shadowpuppet.tracking.multiview.settings import MULTIVIEW_PRESETS
 
 MARKER = re.compile(r"^<!-- (settings|spec|help|presets|example)(?:: (.*?))? -->$", re.MULTILINE)
@@ -95,11 +95,11 @@ def help_text(*command: str) -> str:
 
 def presets() -> str:
     """The settings that each preset changes, as TOML."""
+    tables = {"tracker": PRESETS, "multiview": MULTIVIEW_PRESETS, "initialization": INITIALIZATION_PRESETS}
     parts = ["**`default`**: the defaults above."]
-    for table, known in (("tracker", PRESETS), ("multiview", MULTIVIEW_PRESETS)):
-        for name, values in known.items():
-            if values:
-                parts += [f"**`{name}`**", "```toml\n" + tomli_w.dumps({table: values}).strip() + "\n```"]
+    for name in dict.fromkeys(name for known in tables.values() for name in known):
+        changed = {table: known[name] for table, known in tables.items() if known.get(name)}
+        parts += [f"**`{name}`**", "```toml\n" + tomli_w.dumps(changed).strip() + "\n```"] if changed else []
     return "\n\n".join(parts)
 
 

@@ -102,10 +102,21 @@ def test_one_preset_is_for_both_trackers():
     assert paper.multiview == make_multiview_settings("ni2008", {"particles": 5})
     assert paper.tracker == MonocularSettings()
     assert make_options({"preset": "liu2011"}).multiview == MultiviewSettings()
-    with pytest.raises(SettingsError, match="unknown preset 'ni'; there are: default, liu2011, ni2008"):
+    with pytest.raises(SettingsError, match="unknown preset 'ni'; there are: default, liu2011, liu2011_printed, ni2008"):
         make_options({"preset": "ni"}, "run.toml")
     with pytest.raises(SettingsError, match="unknown preset 'liu2011'; there are: default, ni2008"):
         make_multiview_settings("liu2011")
+
+
+def test_a_preset_measures_as_algorithm_1_is_printed_and_tracks_as_the_papers():
+    printed, paper = make_options({"preset": "liu2011_printed"}), make_options({"preset": "liu2011"})
+    assert printed.tracker == paper.tracker
+    assert paper.initialization == InitializationSettings()
+    found = printed.initialization
+    assert (found.share, found.shrink, found.prior_weight, found.posture_weight, found.sweeps) == (1, 1, 0, 0, 1)
+    assert not found.memory
+    assert make_options({"preset": "liu2011_printed", "initialization": {"memory": True}}).initialization.memory
+    assert printed.smoothing == ("off", 0.0)
 
 
 def test_names_that_settings_of_several_cameras_offer_are_those_there_are():
@@ -171,7 +182,7 @@ def test_what_is_wrong_is_said_with_its_place_and_what_is_possible(overrides, sa
 @pytest.mark.parametrize(("values", "said"), [
     ({"hypotheses": 1}, "hypotheses"), ({"sigma": 0}, "sigma"), ({"share": 0}, "share"), ({"shrink": 1.5}, "shrink"),
     ({"prior_weight": -1}, "prior_weight"), ({"tolerance": 2}, "tolerance"), ({"patience": 0}, "patience"), ({"rounds": 0}, "rounds"),
-    ({"sweeps": 0}, "sweeps"), ({"cycles": 1}, "unknown setting 'cycles'; there are: hypotheses, patience"),
+    ({"sweeps": 0}, "sweeps"), ({"cycles": 1}, "unknown setting 'cycles'; there are: hypotheses, memory, patience"),
 ])  # fmt: skip
 def test_what_is_wrong_in_other_tables_is_said_alike(values, said):
     with pytest.raises(SettingsError) as error:

@@ -35,6 +35,8 @@ class Verdict:
     """Whether our conclusion is the same; None where the runs do not decide, `DEPENDS` where readings differ: `got` says why."""
     shown: str = ""
     """The file of its picture, if any."""
+    own: bool = False
+    """Whether this is a question of our own beside the paper's claims."""
 
     @property
     def row(self) -> tuple[str, str, str, str]:

@@ -85,6 +85,8 @@ def section(folders: Sequence[Sequence[Summary]]) -> str:
     machine = first[0]["environment"]
     where = f"On {machine['cpu']}, {machine['cores']} cores, {machine['vectors']}; Python {machine['python']}, NumPy {machine['numpy']}."
     parts = [where + short_warning(first), "### What the paper says, and what we got", count(first), claims(folders), contradictions(first)]
+    if any(claim.get("own") for result in first for claim in result["claims"]):
+        parts += ["### Questions of our own", "Beside the paper's claims.", claims(folders, own=True)]
     return "\n\n".join([part for part in parts if part] + [experiment(result) for result in first]) + "\n"
 
 
@@ -95,23 +97,24 @@ def short_warning(results: Sequence[Summary]) -> str:
 
 def count(results: Sequence[Summary]) -> str:
     """A sentence on how many claims hold."""
-    same = [claim["same"] for result in results for claim in result["claims"]]
+    same = [claim["same"] for result in results for claim in result["claims"] if not claim.get("own")]
     depends = f"{n} depend{'s' * (n == 1)} on how the paper is read, " if (n := same.count(DEPENDS)) else ""
     return (f"Of {len(same)} conclusions {same.count(True)} are the same here, {same.count(False)} are not, {depends}and for "
             f"{same.count(None)} the runs are inconclusive. The criterion for 'the same' is stated in each row, and the answer is "
             "computed.")
 
 
-def claims(folders: Sequence[Sequence[Summary]]) -> str:
-    """The table of all claims, with a pair of columns for each folder."""
+def claims(folders: Sequence[Sequence[Summary]], own: bool = False) -> str:
+    """The table of the paper's claims, or of our `own`, with a pair of columns for each folder."""
     rows: dict[tuple[str, str], list[list[Summary]]] = {}
     for k, results in enumerate(folders):
-        for claim in (claim for result in results for claim in result["claims"]):
+        for claim in (claim for result in results for claim in result["claims"] if claim.get("own", False) == own):
             rows.setdefault((claim["claim"], claim["where"]), [[] for _ in folders])[k].append(claim)
     named = [recordings(results) for results in folders]
-    columns = ["paper said", "where"]
+    columns = ["question" if own else "paper said", "where"]
     for name in named:
-        columns += ["we got", "same conclusion?"] if len(folders) == 1 else [f"we got: {name}", "same?"]
+        answer = "so?" if own else "same conclusion?" if len(folders) == 1 else "same?"
+        columns += ["we got" if len(folders) == 1 else f"we got: {name}", answer]
     return markdown(columns, [[*key, *(cell for each in row for cell in judged(each))] for key, row in rows.items()])
 
 
@@ -132,7 +135,7 @@ def contradictions(results: Sequence[Summary]) -> str:
     parts = []
     for answer, title in ((False, "Where our runs contradict the paper"), (DEPENDS, "Where the answer depends on how the paper is read")):
         lines = [f"- *{claim['claim']}* ({claim['where']}): {claim['got']}; see [`{result['name']}`](#{anchor(result)})."
-                 for result in results for claim in result["claims"] if claim["same"] == answer]  # fmt: skip
+                 for result in results for claim in result["claims"] if claim["same"] == answer and not claim.get("own")]  # fmt: skip
         parts += [f"**{title}:**", "\n".join(lines)] if lines else []
     return "\n\n".join(parts)
 

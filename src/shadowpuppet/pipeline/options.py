@@ -18,16 +18,24 @@ from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.settings import checked, plain_values, settings_of, validate
 from shadowpuppet.silhouette.settings import SilhouetteSettings
-from shadowpuppet.tracking.monocular.settings import PRESETS, InitializationSettings, MonocularSettings, make_settings
+from shadowpuppet.tracking.monocular.settings import (
+    INITIALIZATION_PRESETS,
+    PRESETS,
+    InitializationSettings,
+    MonocularSettings,
+    make_initialization,
+    make_settings,
+)
 from shadowpuppet.tracking.multiview.settings import MULTIVIEW_PRESETS, MultiviewSettings, make_multiview_settings
 from shadowpuppet.tracking.smoothing.method import Method
 from shadowpuppet.video.moments import moment_text
 
 TABLES = ("tracker", "multiview", "silhouette", "initialization", "training")
 """Options that are tables of settings."""
-TRACKERS: dict[str, tuple[Mapping[str, Any], Callable[..., Any]]] = {
-    "tracker": (PRESETS, make_settings), "multiview": (MULTIVIEW_PRESETS, make_multiview_settings)}  # fmt: skip
-"""For each tracker's table of settings: its presets, and the function that makes the settings."""
+WITH_PRESETS: dict[str, tuple[Mapping[str, Any], Callable[..., Any]]] = {
+    "tracker": (PRESETS, make_settings), "multiview": (MULTIVIEW_PRESETS, make_multiview_settings),
+    "initialization": (INITIALIZATION_PRESETS, make_initialization)}  # fmt: skip
+"""For each table of settings that has presets: these, and the function that makes the settings."""
 PATHS = ("calibration", "background", "person", "prior")
 """Options that are file names, relative to the folder of the settings file that contains them."""
 
@@ -56,7 +64,8 @@ class Options:
     """Settings of a run; each is a flag of the command line and a line of TOML."""
 
     preset: str = "default"
-    """Settings to start from: default (best results), liu2011 (the paper's, one camera) or ni2008 (the paper's, several cameras)."""
+    """Settings to start from: default (best results), liu2011 (the paper's, one camera; liu2011_printed with its measuring of the person,
+    too, from reference pictures) or ni2008 (the paper's, several cameras)."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Seed of the random numbers; the same seed gives the same run."""
     height: Annotated[float, Field(ge=HEIGHTS[0], le=HEIGHTS[1]), _metres(HEIGHTS)] | None = None
@@ -131,13 +140,13 @@ def make_options(values: Mapping[str, Any] | None = None, source: str = "setting
     preset = values.get("preset", "default")
     if not isinstance(preset, str):
         raise SettingsError(f"{source}: preset: found {preset!r}, expected a name in quotes")
-    known = [*dict.fromkeys(name for presets, _ in TRACKERS.values() for name in presets)]
+    known = [*dict.fromkeys(name for presets, _ in WITH_PRESETS.values() for name in presets)]
     if preset not in known:
         raise SettingsError(f"{source}: unknown preset {preset!r}; there are: {choices(known)}")
     if values.get("body") is not None:
-        values |= {table: {**values.get(table, {}), "body": values["body"]} for table in TRACKERS
-                   if table == "tracker" or values["body"] in WHOLE}
-    for table, (presets, make) in TRACKERS.items():
+        tables = ("tracker", "multiview") if values["body"] in WHOLE else ("tracker",)
+        values |= {table: {**values.get(table, {}), "body": values["body"]} for table in tables}
+    for table, (presets, make) in WITH_PRESETS.items():
         values[table] = make(preset if preset in presets else "default", values.get(table, {}), f"{source}: {table}")
     return validate(Options, values, source)
 

@@ -171,6 +171,17 @@ def test_sizes_stay_possible_whatever_is_drawn():
     assert min(v for name, v in zip(CardboxSizes.names(), sizes.to_array()) if name not in ("neck_gap", "shoulder_inset")) >= 0.01
 
 
+@pytest.mark.parametrize("memory", [True, False])
+def test_without_memory_a_round_may_end_worse_than_it_began(memory):
+    """Of hypotheses that are all wild, each worse than where they began."""
+    wild = InitializationSettings(hypotheses=5, sigma=0.4, share=1.0, shrink=1.0, prior_weight=0.0, rounds=4, sweeps=1, memory=memory)
+    masks = list(references("cardbox").values())
+    poses = np.array([BODIES["cardbox"](SOMEONE).skeleton.pose(torso_y=0.3 * i, **angles) for i, angles in enumerate(POSTURES.values())])
+    search = SizeSearch(CAMERA, masks, poses, TRUE, SizePrior(1.78), wild, "cardbox")
+    search.search(np.random.default_rng(0), search.columns(CardboxSizes.names()), [0, 1, 2], wild, wild.sigma)
+    assert (search.estimate().sizes == SOMEONE) == memory
+
+
 @pytest.mark.parametrize("names", [["front_t_pose"], ["side_arms_hanging"], ["front_arms_t_pose", "side_arms_hanging"]])
 def test_some_references_are_enough_to_begin_with(names):
     few = {name: references()[name] for name in names}

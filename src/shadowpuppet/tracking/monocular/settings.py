@@ -97,7 +97,9 @@ PRESETS: dict[str, dict] = {
         "patience": 0.0,
     },
 }
-"""Named settings: "default", the best known, and "liu2011", the filter of Table I; values that a preset leaves out are the default's."""
+PRESETS["liu2011_printed"] = PRESETS["liu2011"]
+"""Named settings: "default", the best known, and "liu2011", the filter of Table I; values that a preset leaves out are the default's.
+"liu2011_printed" differs in `INITIALIZATION_PRESETS`."""
 
 
 def make_settings(preset: str = "default", overrides: Mapping[str, Any] | None = None, source: str = "settings") -> MonocularSettings:
@@ -128,4 +130,20 @@ class InitializationSettings:
     rounds: Annotated[int, Field(ge=1)] = 40
     """Largest number of rounds for each subset."""
     sweeps: Annotated[int, Field(ge=1)] = 3
-    """Number of passes through the three subsets."""
+    """Number of passes through the three subsets. From the second on, the first subset's search varies the third's sizes, too."""
+    memory: bool = True
+    """Whether a round begins with the best hypothesis of all rounds; in the paper it is the best of the last round, better or worse."""
+
+
+INITIALIZATION_PRESETS: dict[str, dict] = {
+    "default": {},
+    "liu2011_printed": {"share": 1.0, "shrink": 1.0, "prior_weight": 0.0, "posture_weight": 0.0, "sweeps": 1, "memory": False},
+}
+"""Named settings of the sizes' search, as `PRESETS`: "liu2011_printed" is Algorithm 1 as the paper prints it. It needs reference pictures:
+without a prior of the sizes, other pictures do not determine them."""
+
+
+def make_initialization(preset: str = "default", overrides: Mapping[str, Any] | None = None,
+                        source: str = "settings") -> InitializationSettings:
+    """A preset of the sizes' search with some values replaced, as `from_preset`."""
+    return from_preset(InitializationSettings, INITIALIZATION_PRESETS, preset, overrides, source)

@@ -151,12 +151,12 @@ class SizeSearch:
                sigma: float, scale: bool = True) -> list[float]:
         """The inner loop of Algorithm 1: draw `columns` around the best vector (eq. 4) until its cost settles; returns the cost by
         round."""
-        observations = self.observe()
+        observations, kept = self.observe(), int(settings.memory)
         best, least, curve = self.vector, np.inf, []
         for _ in range(settings.rounds):
             vectors = np.repeat(best[None], settings.hypotheses, axis=0)
-            noise = rng.standard_normal((settings.hypotheses - 1, len(columns))) * sigma
-            vectors[1:, columns] += noise * (rng.random(noise.shape) < settings.share)
+            noise = rng.standard_normal((settings.hypotheses - kept, len(columns))) * sigma
+            vectors[kept:, columns] += noise * (rng.random(noise.shape) < settings.share)
             if scale:
                 self.scale_with_distance(vectors, best)
             self.bound(vectors)
