@@ -23,7 +23,7 @@ from shadowpuppet.motion.motion import BLANK, JointTable, Mode, MotionBuilder, M
 from shadowpuppet.motion.synchronization import at_times
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.person_rig import fit_multiview
-from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
+from shadowpuppet.pipeline.rig import open_rig, read_frames
 from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.synthetic import proving_rings, synthesize
 from shadowpuppet.tracking.doubt.doubt import Points, pose_deviations, state_doubt
@@ -199,7 +199,7 @@ def track_multiview(path: Path) -> Iterator[Tracked]:
     survey = survey_rig(open_rig(path, options), options)
     subject = fit_multiview(np.random.default_rng(0), survey, options)
     truth, rate = read_joints(path / "truth.csv"), survey.rig.rate
-    frames = [(each.time, each.masks) for each in synchronized_frames(survey.rig, survey.silhouettes)]
+    frames = [(each.time, each.masks) for each in read_frames(survey.rig, [each.following() for each in survey.silhouettes])]
     empty = [np.zeros(camera.size[::-1], bool) for camera in subject.hull.cameras]
     films = [[none if (mask := masks[n]) is None else mask for _, masks in frames] for n, none in enumerate(empty)]
     times, body, names = [time for time, _ in frames], subject.body, subject.body.landmark_names

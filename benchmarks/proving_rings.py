@@ -33,7 +33,7 @@ from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, fit_multiview
-from shadowpuppet.pipeline.rig import open_rig, synchronized_frames
+from shadowpuppet.pipeline.rig import open_rig, read_frames
 from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 
@@ -77,7 +77,7 @@ class Case:
         self.survey = survey_rig(self.rig, make_options({"masks": masks}))
         truth = read_joints(self.rig.recording.truth)  # pyright: ignore[reportArgumentType]
         self.times, self.bits = [], []
-        for seen in synchronized_frames(self.rig, self.survey.silhouettes, ready=masks):
+        for seen in read_frames(self.rig, [each.following() for each in self.survey.silhouettes], ready=masks):
             self.times.append(seen.time)
             self.bits.append([None if mask is None else (np.packbits(mask), mask.shape) for mask in seen.masks])
             if len(self.times) == frames:
