@@ -181,7 +181,7 @@ def test_what_does_not_fit_is_refused_in_a_sentence(recording, run, shell):
     assert f"{person}: sizes: found those of the body 'anatomical', expected those of 'cylinders'" in said
     assert "body: found 'rounded', an upper body, for several cameras; expected one of" in refused(shell, recording, "--body", "rounded")
     assert "found 0; input should be greater than or equal to 1" in refused(shell, recording, "--multiview.particles", 0)
-    assert "unknown preset 'ni'; there are: default, liu2011, ni2008" in refused(shell, recording, "--preset", "ni")
+    assert "unknown preset 'ni'; there are: default, liu2011, liu2011_printed, ni2008" in refused(shell, recording, "--preset", "ni")
     assert "person.toml: cannot be read" in refused(shell, recording, "--person", "person.toml")
     made.replace_text(made.copied(person.parent, Path("spoilt")) / "person.toml", "thigh_length", "thigh_size")
     assert "spoilt/person.toml: " in refused(shell, recording, "--person", "spoilt/person.toml")
