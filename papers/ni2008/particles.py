@@ -16,7 +16,7 @@ from papers.ni2008.tracks import Way, hybrid, of, particle_filter, tracks
 PLAIN, HYBRID, FEW = (250, 1000, 10_000), (5, 10, 20, 40), 1000
 """Particles, and those of Table II."""
 ENOUGH = 1.25
-"""A result is good whose error is under so many times that of the hybrid with 40 particles."""
+"""A result is good whose error is under this multiple of that of the hybrid with 40 particles."""
 Curve = Mapping[tuple[str, int], list[Errors]]
 """Errors by method and number of particles."""
 
@@ -69,7 +69,7 @@ def verdicts(curves: Mapping[str, Curve], most: int) -> list[Verdict]:
 
 
 def good(each: Curve, particles: int, wanted: bool) -> bool | None:
-    """Whether the plain filter with so many particles is good, or is not, as is `wanted`, by the runs."""
+    """Whether the plain filter with this number of particles is good, or not good, as `wanted` says, by the runs."""
     plain, limit = [one.rmse for one in each["particle filter", particles]], ENOUGH * np.array([one.rmse for one in each["hybrid", 40]])
     return (difference(limit, plain) if wanted else difference(plain, limit)).greater
 

@@ -23,7 +23,7 @@ PAPER = {
 FLOOR = "inverse kinematics"
 """The row of the poses that fit the true joints best: no method is nearer with ten cylinders."""
 WELL = 2.0
-"""The image force does well where its error is under so many times the hybrid's: in the paper it is 1.6 times on walking."""
+"""The image force does well where its error is under this multiple of the hybrid's: in the paper it is 1.6 times on walking."""
 
 
 class Runs(NamedTuple):
@@ -209,7 +209,7 @@ def said(found: Found) -> list[str]:
     return [f"Lost: joints are {1000 * FAR:.0f} mm off on average in over {OFTEN:.0%} of the frames. There is no search after a "
             "loss, unlike in `shadowpuppet track`. Times are on one core, for tracking alone; the paper's are for MATLAB.",
             "The image force is read in two ways, as the paper says only that it is \"image force/ICP based, similar to\" its ref. [11]: "
-            "as plain ICP, without normals and bound; and as the paper's own forces on one particle, with so many iterations or until "
+            "as plain ICP, without normals and bound; and as the paper's own forces on one particle, with 12 or 40 iterations or until "
             "they balance. Both pass a force on to the joints above, as that reference's dynamics do; without that the person is lost at "
             f"once ({alone}).",
             f"Share of the frames in which the image force has exchanged left and right leg: {legs}.",

@@ -65,7 +65,7 @@ IMAGE_FORCES = (
     *(Way(f"image force, {n} iterations", {**ONE, "forces": {"iterations": n}}) for n in (12, 40)),
     Way("image force, balanced", ONE),
 )
-"""Readings of "an image force/ICP based method similar to [11]" (VII): plain ICP, or the paper's own forces, with so many iterations or
+"""Readings of "an image force/ICP based method similar to [11]" (VII): plain ICP, or the paper's own forces, with 12 or 40 iterations or
 until they balance."""
 ALONE = Way("image force, each joint alone", {**ONE, "forces": ICP | {"hierarchical": False}})
 FORCES_FROM_TRUTH = Way("forces from the true pose", ONE, from_truth=True)

@@ -96,7 +96,7 @@ def test_who_stands_between_the_cameras_has_no_tangents_and_none_is_at_the_borde
     pair = looking([3, 0, 1.0]), looking([-3, 0, 1.0])
     around = outlines_of(pair, silhouettes_of([ball(camera, np.array([0, 0, 1.0])) for camera in pair]))
     assert None not in around
-    assert tangent_angles(pair, tuple(around)) is None  # type: ignore[arg-type]
+    assert tangent_angles(pair, tuple(around)) is None
     first, second = outlines_of(CAMERAS[:2], row(CAMERAS[:2]))
     assert first is not None
     assert second is not None

@@ -9,7 +9,6 @@ import pytest
 
 from shadowpuppet.calibration.overview import MAP_COLUMNS, CalibrationLook, CameraPlacement
 from shadowpuppet.cli.calibration.explain import ARROWS, calibration_table, top_view
-from shadowpuppet.cli.tables import show
 
 CAMERA = CameraPlacement(name="left", size=(640, 480), fov=(55.4, 42.0), lens="distorted", bend=-12.4, place=(-1.5, 2.25, 1.0), facing=0.0,
                          down=10.2, roll=-3.4, away=2.5, placed=True)  # fmt: skip
@@ -20,17 +19,6 @@ def look(*cameras: CameraPlacement, **more) -> CalibrationLook:
     plain = CalibrationLook(path="lab.toml", format="pose2sim", unit="m", unit_told=True, cameras=cameras, apart=(1.0, 2.5),
                             middle=(0.0, 0.1, 0.9), corners=(-4.0, -4.0, 4.0, 4.0), seen=EMPTY, notes=(), doubts=())  # fmt: skip
     return replace(plain, **more)
-
-
-@pytest.fixture
-def printed(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "300")
-
-    def lines(*parts) -> list[str]:
-        show(*parts)
-        return [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
-
-    return lines
 
 
 def test_a_calibration_in_words(printed):

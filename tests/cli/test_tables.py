@@ -9,21 +9,8 @@ import pytest
 from shadowpuppet.cli import batch_terminal
 from shadowpuppet.cli.batch_terminal import LINES, BatchTerminal, _clock, _pace
 from shadowpuppet.cli.look_tables import _camera_table, _film, _quality, _rig_person, _rig_table
-from shadowpuppet.cli.tables import error_table, files_in, metrics_table, people_table, show, verdict_table
+from shadowpuppet.cli.tables import error_table, files_in, metrics_table, people_table, verdict_table
 from shadowpuppet.cli.terminal import Terminal
-
-
-@pytest.fixture
-def printed(capsys, monkeypatch):
-    """The lines that a table is printed as, with single blanks."""
-    monkeypatch.setenv("COLUMNS", "300")
-
-    def lines(*parts) -> list[str]:
-        show(*parts)
-        return [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
-
-    return lines
-
 
 QUALITY = SimpleNamespace(frames=12, area=0.0512, area_change=0.0123, flicker=0.0045, specks=0.25, holes=1.5,
                           border={"left": 0.021, "right": 0.02, "bottom": 0.5})  # fmt: skip

@@ -1,6 +1,6 @@
 """Fingerprints of made recordings: what the documentation's figures were measured on stays what it is.
 
-A change that is wanted: `python tests/support/kept.py` writes `kept.json` anew, and the figures are measured anew.
+After an intended change `python tests/support/kept.py` updates `kept.json`, and the documented figures must be measured again.
 """
 
 from __future__ import annotations

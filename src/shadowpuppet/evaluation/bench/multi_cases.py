@@ -106,7 +106,7 @@ class MultiCase:
         return self.hull.points(self.silhouettes)
 
     def run_forces(self, iterations: int) -> Array:
-        """All poses after just so many iterations of simulated forces."""
+        """All poses after a number of iterations of simulated forces, balanced or not."""
         return self.refiner.forces(self.poses, self.cloud, ForceSettings(iterations=iterations, balance=0.0))
 
     def run_gauss_newton(self, iterations: int) -> Array:

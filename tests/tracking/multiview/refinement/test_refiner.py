@@ -284,7 +284,7 @@ def test_forces_are_bounded_and_go_by_the_normals_only_if_wanted():
 
 @pytest.mark.parametrize("name", WHOLE)
 def test_forces_that_balance_move_nothing_more(name, rng):
-    """The iterations end where a step is less than `balance`, and so nearer for a smaller one; so many more change nothing then."""
+    """The iterations end where a step is less than `balance`, and so nearer for a smaller one; a larger limit changes nothing then."""
     of, _, cloud, starts = beside(name, rng)
     none, some, more, nearer = (Refiner(of).forces(starts, cloud, ForceSettings(iterations=n, balance=balance))
                                 for n, balance in ((60, 10.0), (60, 0.02), (600, 0.02), (600, 0.002)))

@@ -13,7 +13,7 @@ from shadowpuppet.tracking.multiview.refinement.part_sums import add_descendants
 @kernel
 def push(poses, bounded, modulated, hierarchical, gains, balance, iterations, chain, limbs, rows, spheres, origin, numbers, which, room,
          vectors):  # pragma: no cover
-    """Move poses (N, D), in place, by forces and moments until these balance, with at most so many `iterations`, as `Refiner.forces`
+    """Move poses (N, D), in place, by forces and moments until these balance, in at most `iterations` steps, as `Refiner.forces`
     describes. Without `hierarchical` only the forces on parts fixed to a joint move it; the root is translated by the forces on all parts
     in either case."""
     T, screws, work, sums, force = room[1], room[2], room[3], room[6], vectors[1, :4]

@@ -27,7 +27,7 @@ LEAST_LENGTH, LIMB_LENGTH = 0.03, 0.08
 """Least length (m) of a ray's part within all other silhouettes, and the length that one ray of a limb has: an ankle's thickness. A shadow
 beside a foot has shorter parts only."""
 ALONG = (0.25, 0.5, 0.75)
-"""Places on such a part, of which the other cameras must see one within their pictures."""
+"""Places along such a part: at least one must lie inside the silhouettes, within the pictures, of all other cameras."""
 
 
 class SharedShadows:
@@ -95,7 +95,7 @@ def _covers(mask: Mask, pixels: Array) -> NDArray[np.bool_]:
 
 
 def _limbs(pixels: NDArray[np.int64], lengths: Array, shadow: Mask, pitch: int) -> Mask:
-    """The parts of `shadow` (H, W) around found pixels (P, 2) of the grid that are not thin, and of which one ray has a limb's length.
+    """The parts of `shadow` (H, W) around found pixels (P, 2) of the grid that are not thin and have a ray of at least a limb's length.
 
     lengths: of the pixels' rays (P,), as `_shared` has them.
     """
