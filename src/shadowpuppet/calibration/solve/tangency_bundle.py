@@ -7,7 +7,7 @@ calibration, which is also a weak prior: it decides what outlines do not show, t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
@@ -27,12 +27,16 @@ ROUGH_ANGLE, ROUGH_PLACE = np.radians(10.0), 0.5
 LOSS_SCALES = (16.0, 4.0, 1.5)
 """Scales (pixels of a picture 1000 wide) of the soft L1 loss, one after another: first all tangents count, then those of a limb that a
 silhouette lacks less and less."""
+FAR_PIXELS = 5.0
+"""Distance of tangents, pixels of a picture 1000 wide, that is not an outline's noise."""
 LEAST_TANGENTS = 30
 """Least number of tangents per camera."""
 STEPS = 40
 """Greatest number of steps with each loss."""
-NUDGES = np.array([1e-5] * 3 + [1e-5] * 3)
-"""Differences of the numeric derivatives, rad and m."""
+NUDGE = 1e-5
+"""Difference of the numeric derivatives, rad and m."""
+BLOCKS = 20
+"""Number of parts of the film whose disagreement tells the standard deviations."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,6 +54,8 @@ class TangencyFit:
     """The same of their directions, of shape (C,), radians."""
     tangents: int
     """Number of pairs of tangents compared."""
+    far: float
+    """Share of these that are over `FAR_PIXELS` apart."""
 
 
 class _Hulls(NamedTuple):
@@ -91,8 +97,9 @@ def place_by_outlines(cameras: Sequence[Camera], rows: Sequence[Row], free: Sequ
     now = _moved(cameras, value)
     last = [_distances(now, hulls, pair) for pair in pairs]
     place_sd, angle_sd = _deviations(now, hulls, pairs, free, LOSS_SCALES[-1] * size)
+    values = np.concatenate([each[np.isfinite(each)] for each in last])
     return TangencyFit(cameras=tuple(now), before=_medians(len(cameras), pairs, found), after=_medians(len(cameras), pairs, last),
-                       place_sd=place_sd, angle_sd=angle_sd, tangents=int(sum(np.isfinite(each).sum() for each in last)))
+                       place_sd=place_sd, angle_sd=angle_sd, tangents=len(values), far=float((np.abs(values) > FAR_PIXELS * size).mean()))
 
 
 def _check(cameras: Sequence[Camera], pairs: Sequence[_Pair], found: Sequence[Array], free: Sequence[int]) -> None:
@@ -155,7 +162,7 @@ def _minimised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequen
     found = [_distances(_moved(cameras, value), hulls, pair) for pair in pairs]
     cost = _loss(found, scale) + float((prior * value.ravel()[places] ** 2).sum()) / 2
     for _ in range(STEPS):
-        H, g = _normal(cameras, hulls, pairs, value, found, scale)
+        H, g = _normal(_linearised(cameras, hulls, pairs, value, found), value.size, scale)
         H, g = H[np.ix_(places, places)] + np.diag(prior), g[places] + prior * value.ravel()[places]
         better = False
         for _ in range(8):
@@ -182,45 +189,65 @@ def _loss(found: Sequence[Array], scale: float) -> float:
     return float((scale**2 * (np.sqrt(1 + (known / scale) ** 2) - 1)).sum())
 
 
-def _normal(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], value: Array, found: Sequence[Array],
-            scale: float) -> tuple[Array, Array]:
-    """Normal equations (6 C, 6 C) and gradient (6 C,) of the loss, of all cameras."""
-    H, g = np.zeros((value.size, value.size)), np.zeros(value.size)
-    nudged = [[_moved_one(cameras[n], value[n] + nudge) for nudge in np.diag(NUDGES)] for n in range(len(cameras))]
+class _Linear(NamedTuple):
+    """A pair's distances to first order."""
+
+    columns: NDArray[np.int64]
+    """Of both cameras' increments, of shape (12,)."""
+    slopes: Array
+    """Of shape (12, K), for K known distances."""
+    values: Array
+    """Of shape (K,), pixels."""
+    sets: NDArray[np.int64]
+    """Of shape (K,)."""
+
+
+def _linearised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], value: Array,
+                found: Sequence[Array]) -> Iterator[_Linear]:
+    """The distances `found` at increments (C, 6) and, by differences, their derivatives."""
     now = _moved(cameras, value)
+    nudged = [[_moved_one(camera, own + step) for step in np.eye(6) * NUDGE] for camera, own in zip(cameras, value)]
     for pair, base in zip(pairs, found):
         known = np.isfinite(base)
         slopes = np.zeros((12, known.sum()))
         for side, n in enumerate(pair[:2]):
             for k in range(6):
-                there = list(now)
-                there[n] = nudged[n][k]
-                slopes[6 * side + k] = np.nan_to_num((_distances(there, hulls, pair)[known] - base[known]) / NUDGES[k])
-        weights = 1 / np.sqrt(1 + (base[known] / scale) ** 2)
+                there = [*now[:n], nudged[n][k], *now[n + 1 :]]
+                slopes[6 * side + k] = np.nan_to_num((_distances(there, hulls, pair)[known] - base[known]) / NUDGE)
         columns = np.r_[6 * pair.first + np.arange(6), 6 * pair.second + np.arange(6)]
-        H[np.ix_(columns, columns)] += (slopes * weights) @ slopes.T
-        g[columns] += slopes @ (weights * base[known])
+        yield _Linear(columns, slopes, base[known], np.repeat(pair.sets[:, None], 2, 1)[known])
+
+
+def _normal(parts: Iterable[_Linear], size: int, scale: float) -> tuple[Array, Array]:
+    """Normal equations (size, size) and gradient (size,) of the loss."""
+    H, g = np.zeros((size, size)), np.zeros(size)
+    for part in parts:
+        weighted = part.slopes / np.sqrt(1 + (part.values / scale) ** 2)
+        H[np.ix_(part.columns, part.columns)] += weighted @ part.slopes.T
+        g[part.columns] += weighted @ part.values
     return H, g
 
 
 def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], free: Sequence[int],
                 scale: float) -> tuple[Array, Array]:
-    """Standard deviations of centres (C,), m, and directions (C,), rad. If all cameras are free, those that a motion or a scale of the
-    whole rig cannot change."""
+    """Standard deviations of centres (C,), m, and directions (C,), rad, from how much parts of the film would move them (a "sandwich" of
+    gradients by blocks of sets: neighbouring silhouettes err together). If all cameras are free, within the rig: not of what a motion or
+    a scale of the whole rig changes."""
     found = [_distances(cameras, hulls, pair) for pair in pairs]
-    zero = np.zeros((len(cameras), 6))
-    H, _ = _normal(cameras, hulls, pairs, zero, found, scale)
-    values = np.concatenate([each[np.isfinite(each)] for each in found])
-    variance = float((1.4826 * np.median(np.abs(values))) ** 2)
+    parts, size, last = list(_linearised(cameras, hulls, pairs, np.zeros((len(cameras), 6)), found)), 6 * len(cameras), 0
+    H, _ = _normal(parts, size, scale)
+    last = max(int(pair.sets[-1]) for pair in pairs) + 1
+    blocks = np.zeros((BLOCKS, size))
+    for part in parts:
+        pulls = part.slopes * (part.values / np.sqrt(1 + (part.values / scale) ** 2))
+        for k, column in enumerate(part.columns):
+            blocks[:, column] += np.bincount(part.sets * BLOCKS // last, pulls[k], BLOCKS)
     places = [6 * n + k for n in free for k in range(6)]
-    basis = np.eye(len(places))
-    if len(free) == len(cameras):
-        basis = np.linalg.svd(_whole_rig(cameras).T)[2][7:].T
-    inner = basis.T @ H[np.ix_(places, places)] @ basis
-    covariance = np.zeros_like(H)
-    covariance[np.ix_(places, places)] = variance * basis @ np.linalg.pinv(inner, hermitian=True) @ basis.T
-    own = np.diag(covariance).reshape(-1, 6)
-    return np.sqrt(own[:, 3:].sum(1)), np.sqrt(own[:, :3].sum(1))
+    basis = np.linalg.svd(_whole_rig(cameras).T)[2][7:].T if len(free) == len(cameras) else np.eye(len(places))
+    spread = basis @ np.linalg.pinv(basis.T @ H[np.ix_(places, places)] @ basis, hermitian=True) @ basis.T @ blocks[:, places].T
+    own = np.zeros(size)
+    own[places] = (spread**2).sum(1) * BLOCKS / (BLOCKS - 1)
+    return np.sqrt(own.reshape(-1, 6)[:, 3:].sum(1)), np.sqrt(own.reshape(-1, 6)[:, :3].sum(1))
 
 
 def _whole_rig(cameras: Sequence[Camera]) -> Array:
