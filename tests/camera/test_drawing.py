@@ -34,8 +34,10 @@ def a_picture(distance: float = 2.0, body: str = "cardbox") -> Picture:
 
 
 def a_pose(picture: Picture, **angles: float) -> Array:
-    level = {"left_shoulder_abduction": 1.5, "right_shoulder_abduction": 1.2, "left_elbow_flexion": 0.6}
-    return picture.body.skeleton.pose(**level | angles)
+    """Arms held out, the left forearm forward; a hinge's flexion is a bend forward where the body has that instead."""
+    level = {"left_shoulder_abduction": 1.5, "right_shoulder_abduction": 1.2, "left_elbow_flexion": 0.6} | angles
+    bends = "left_elbow_forward" in picture.body.skeleton.dof_names
+    return picture.body.skeleton.pose(**{name.replace("flexion", "forward") if bends else name: angle for name, angle in level.items()})
 
 
 def a_scene(rng, picture: Picture) -> tuple[np.ndarray, np.ndarray]:
