@@ -456,8 +456,7 @@ def test_control_c_and_the_like_leave_a_run_that_can_be_read_and_goes_on(recordi
     folder, number = tmp_path / "run", getattr(signal, name)
     # Who starts the tests in the background has them, and so their children, ignore Ctrl-C.
     heeding = functools.partial(signal.signal, number, signal.SIG_DFL)
-    child = process("track", recording, "-o", folder, "--tracker.arm.particles", "2000", "--tracker.cycles", "10", *QUICK[2:],
-                    preexec_fn=heeding)
+    child = process("track", recording, "-o", folder, "--tracker.arm.particles", "2000", "--tracker.cycles", "10", preexec_fn=heeding)
     rows, end = folder / "joints.csv", time.monotonic() + 60
     while child.poll() is None and time.monotonic() < end and (not rows.exists() or rows.read_text().count("\n") < 4):
         time.sleep(0.01)

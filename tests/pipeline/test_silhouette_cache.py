@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import made
-import made_rig
 import numpy as np
 import pytest
 from follower import followed
@@ -102,13 +101,13 @@ def test_a_full_store_holds_nothing():
     assert store.size > store.limit
 
 
-def test_several_cameras_share_silhouettes_between_seeds(tmp_path, monkeypatch):
-    recording, cache = made_rig.write(tmp_path / "rig"), SilhouetteCache()
+def test_several_cameras_share_silhouettes_between_seeds(rig_recording, tmp_path, monkeypatch):
+    cache = SilhouetteCache()
     kind = MULTIVIEW._replace(fit=lambda rng, survey, options: followed(survey.rig.cameras))
 
     def tracked(seed: int, cache: SilhouetteCache | None = None) -> tuple[bytes, bool]:
         options = make_options({"seed": seed})
-        result = run(open_rig(recording, options), kind, tmp_path / "run", options, Listener(), cache)
+        result = run(open_rig(rig_recording, options), kind, tmp_path / "run", options, Listener(), cache)
         return (result.folder / "joints.csv").read_bytes(), result.metrics.get("kept_silhouettes", False)
 
     alone = [tracked(seed)[0] for seed in (1, 2)]

@@ -39,9 +39,9 @@ def test_a_colour_is_known_the_less_the_farther_off_it_is_in_any_channel(channel
 
 def test_colours_beyond_the_bins_are_in_the_last_ones():
     ends = [LOWEST + 0.5 * WIDTH, LOWEST + (BINS - 0.5) * WIDTH]
-    for end, beyond in zip(ends, (ends[0] - 300, ends[1] + 300)):
-        np.testing.assert_array_equal(model_of(end), model_of(beyond))
-        assert known(end, model_of(end)) == known(beyond, model_of(end)) > 0.1
+    for end, outward in zip(ends, (-WIDTH, WIDTH)):
+        np.testing.assert_array_equal(model_of(end), model_of(end + 90 * outward))
+        assert known(end - outward, model_of(end)) < known(end, model_of(end)) == known(end + 90 * outward, model_of(end))
 
 
 def test_the_ratio_is_that_of_the_shares_and_none_where_neither_model_knows_the_colour(rng):
