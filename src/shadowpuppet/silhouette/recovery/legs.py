@@ -63,7 +63,7 @@ def waist(trunk: Mask) -> tuple[int, NDArray[np.bool_]]:
     """The row of a trunk's (H, W) centre, and the columns (W,) that it covers there or just above."""
     rows = trunk.sum(axis=1)
     middle = int(np.average(np.arange(len(rows)), weights=rows))
-    return middle, trunk[middle - np.count_nonzero(rows) // WAIST : middle + 1].any(axis=0)
+    return middle, np.any(trunk[middle - np.count_nonzero(rows) // WAIST : middle + 1], axis=0)
 
 
 def _zone(trunk: Mask) -> NDArray[np.bool_]:
