@@ -66,6 +66,16 @@ def test_the_middle_row_is_the_cost_in_colours(rng):
         assert where.any()
 
 
+def test_words_beside_each_other_are_lines_of_text_that_go_on_where_the_last_one_ended():
+    both = np.zeros((2, 60, 300, 3), np.uint8)
+    words = [("left", drawing.WHITE), ("right of it", (10, 200, 30))]
+    drawing.write_words(both[0], 7, words, 240)
+    end = drawing.write_text(both[1], "left", 7, drawing.WHITE, size=240)
+    assert both[1].any((0, 2)).nonzero()[0].max() < end
+    drawing.write_text(both[1], "right of it", 7, (10, 200, 30), end, 240)
+    np.testing.assert_array_equal(*both)
+
+
 @given(st.integers(0, 2**36 - 1))
 def test_matching_tells_all_cases_apart(bits):
     model, mask, ignore = np.array([bits >> i & 1 for i in range(36)], bool).reshape(3, 3, 4)
