@@ -104,6 +104,8 @@ model, and the one that `write_osim` makes. Else positive: a knee bends, an ankl
 inward; a sole turns inward. The upper body's `torso` is the chest. An ankle's inversion is the own model's only: its axis is another in the
 others, as is the neck in the first two, which have none."""
 PELVIS_POSITION = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
+SAME = 1e-9
+"""Difference of rotations that is rounding."""
 TO_MODEL = np.array([[0.0, 0, 1], [0, 1.0, 0], [-1.0, 0, 0]])
 """From a skeleton's axes at rest (left, up, forward) to the model's (forward, up, right)."""
 
@@ -121,6 +123,7 @@ def coordinates(animation: Animation, model: str = "rajagopal") -> dict[str, Arr
     if animation.names[0] != "pelvis" or not len(known):
         raise ShadowPuppetError(f"found {len(known)} known frames of a skeleton from {animation.names[0]!r}, expected some, from 'pelvis'")
     turns = {name: animation.rotations[known][:, n] for n, name in enumerate(animation.names)}
+    turns |= {name: _as_hinge(R) for name, R in turns.items() if name.endswith("_elbow")}
     if "torso" in turns:
         turns["chest"] = turns["torso"]
     turns["pelvis"] = Y_UP @ turns["pelvis"] @ TO_MODEL.T
@@ -164,6 +167,18 @@ def _angles(rotations: Array, part: Ball) -> Array:
 def _rotates(rotations: Array) -> bool:
     """Whether rotations (T, 3, 3) differ from the identity; an ankle's of a body without feet do not."""
     return bool(np.abs(rotations - np.eye(3)).max() > 0)
+
+
+def _as_hinge(R: Array) -> Array:
+    """An elbow's rotations (T, 3, 3) as a twist about the upper arm (y) and then a bend (about x) to the same direction of the forearm;
+    those that are so already, such as of straight arms that roll, as they are."""
+    if np.abs(R[:, 1, 0]).max() < SAME:
+        return R
+    along = R[:, :, 1]
+    bend = np.hypot(along[:, 0], along[:, 2])
+    s, c = (np.divide(along[:, n], bend, out=np.full(len(R), still), where=bend > SAME) for n, still in ((0, 0.0), (2, 1.0)))
+    across = np.stack([c, np.zeros(len(R)), -s], 1)
+    return np.stack([across, along, np.cross(across, along)], 2)
 
 
 def _with_twist(turns: dict[str, Array], joint: str) -> Array:
