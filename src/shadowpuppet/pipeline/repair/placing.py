@@ -86,9 +86,12 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None) 
     listener.begin("placing the cameras")
     fit = place_by_outlines(rig.cameras, rows)
     listener.begin("floor and height")
-    ends = _ends(fit.cameras, rows)
-    height = options.height or rig.recording.subject.height
-    advice = list(_doubts(fit))
+    return grounded(fit, rows, options.height or rig.recording.subject.height)
+
+
+def grounded(fit: TangencyFit, rows: Sequence[Row], height: float | None) -> Placed:
+    """The cameras of a fit with the floor at z = 0 and, if the person's height (metres) is known, in metres: by the visual hulls' ends."""
+    ends, advice = _ends(fit.cameras, rows), list(_doubts(fit))
     if ends is None:
         advice.append("floor and scale are the rough calibration's: the person is hardly ever whole in two pictures")
         return Placed(cameras=fit.cameras, fit=fit, sets=len(rows), scale=1.0, tilt=0.0, advice=tuple(advice))
