@@ -136,7 +136,13 @@ def test_a_part_of_a_recording_keeps_its_times(tmp_path):
             np.testing.assert_array_equal(image, same)
     assert take_sample(part.footage[0]).times == pytest.approx([0.3, 0.4, 0.5, 0.6])
     assert take_sample(part.footage[0]).first[0].time == pytest.approx(0.3)
-    np.testing.assert_array_equal(spread_frames(part.footage[0])[0], take_sample(part.footage[0]).frames[0].image)
+
+
+def test_the_empty_scene_of_a_part_is_recovered_from_the_whole_film(tmp_path):
+    whole = rig(tmp_path, steady(10), suffix=".mp4")
+    part = of_recording(whole, cut(whole.recording, make_options({"start": "3f", "end": 0.7})))
+    assert [number_of(image) for image in spread_frames(part.footage[0])] == list(range(10))
+    assert [number_of(frame.image) for frame in take_sample(part.footage[0]).frames] == [3, 4, 5, 6]
 
 
 @pytest.mark.parametrize(("late", "every"), [(0.0, 1), (0.015, 3), (-0.015, 1)])

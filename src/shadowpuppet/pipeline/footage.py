@@ -149,7 +149,7 @@ def cut(recording: Recording, options: Options) -> Recording:
     length = min(max((each for each in lengths if np.isfinite(each)), default=np.inf), recording.duration or np.inf)
     begin, end = span_of(options.start, options.end, rate, length)
     end = min(end, recording.duration or np.inf)
-    return replace(recording, begin=begin, duration=end if np.isfinite(end) else None)
+    return replace(recording, begin=begin, duration=end if np.isfinite(end) else None, whole=recording)
 
 
 def chosen_views(recording: Recording, names: str | None) -> tuple[View, ...]:
@@ -275,7 +275,8 @@ def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKE
 
 def spread_frames(footage: Footage, number: int = SPREAD) -> list[Image]:
     """`number` images spread over the whole film, or all if there are fewer, found by seeking; none if the film does not state its
-    length."""
+    length. If only a part of the recording is used, those of all of it: a person hardly moves in a few seconds."""
+    footage = replace(footage, recording=footage.recording.whole or footage.recording)
     film, length = footage.film, footage.count
     if length is None or not np.isfinite(film.rate):
         return []
