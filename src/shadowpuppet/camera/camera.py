@@ -123,7 +123,8 @@ class Camera:
         points, still = np.concatenate([xy, np.ones((len(xy), 1))], 1)[:, None], np.zeros(3)
         project = cv2.fisheye.projectPoints if self.fisheye else cv2.projectPoints
         parts = (points[n : n + AT_ONCE] for n in range(0, len(points), AT_ONCE))
-        return np.concatenate([np.reshape(project(part, still, still, self.matrix, self.distortion)[0], (-1, 2)) for part in parts])
+        pixels = [np.asarray(project(part, still, still, self.matrix, self.distortion)[0], float).reshape(-1, 2) for part in parts]
+        return np.concatenate(pixels)
 
     @cached_property
     def reach(self) -> float:

@@ -26,7 +26,7 @@ BY_CAMERA = np.array([(0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 16
 """Colours of cameras (Okabe and Ito 2008) and of the hull points on their contours."""
 TRANSPARENT_OPACITY = 0.75
 """Opacity of transparent figures."""
-PALE_OPACITY = 0.35
+PALE_OPACITY = 0.5
 """Opacity of limbs that are not vouched for."""
 
 
