@@ -98,9 +98,9 @@ LEAST = {"constant": 0.7, "distance": 1.0}
 LEAST_SEVERAL = {"constant": 0.4}
 """Least factors with one camera and with several: made recordings know neither the doubt in where a joint is in a body, nor that in the
 distance. Several cameras fit the body to the person's surface, and so show most of the first."""
-SILENT, MOST_SILENT = 0.005, 0.01
-"""Share of a kind of limb's joints that may be over `FAR_ERROR` off in a limb that is vouched for; and of all joints of a run, above which
-`price_table` counts it."""
+SILENT, MOST_SILENT, OFTEN = 0.005, 0.01, 0.01
+"""Share of a kind of limb's joints that may be over `FAR_ERROR` off in a limb that is vouched for; share of all joints of a run from which
+on it counts as silent; and how many runs may be."""
 LIMITS = (0.24, 0.22, 0.20, 0.185, 0.17, 0.155)
 """Limits (m) of arms in that table."""
 NEAR = 0.1
@@ -213,9 +213,15 @@ def by_run(joints: Iterable[LimbJoint]) -> dict[Tracked, list[LimbJoint]]:
 
 
 def fit_limits(joints: Sequence[LimbJoint]) -> dict[str, float]:
-    """Of each kind of limb the greatest limit (m), up to `FAR_ERROR`, with at most `SILENT` of its joints far off and vouched for."""
+    """Of each kind of limb the greatest limit (m), up to `FAR_ERROR`, with at most `SILENT` of its joints far off and vouched for, and at
+    most `OFTEN` of the runs in which these are over `MOST_SILENT` of all joints: silence has priority over false alarms."""
     kinds = {kind: [each for each in joints if each.kind == kind] for kind in dict.fromkeys(each.kind for each in joints)}
-    return {kind: min(FAR_ERROR, _limit(own, SILENT * sum(len(each.errors) for each in own))) for kind, own in kinds.items()}
+    number = {run: sum(len(each.errors) for each in own) for run, own in by_run(joints).items()}
+    limits = {}
+    for kind, own in kinds.items():
+        of_runs = sorted(_limit(part, MOST_SILENT * number[run]) for run, part in by_run(own).items())
+        limits[kind] = min(FAR_ERROR, _limit(own, SILENT * sum(len(each.errors) for each in own)), of_runs[int(OFTEN * len(of_runs))])
+    return limits
 
 
 def _limit(joints: Sequence[LimbJoint], silent: float) -> float:

@@ -165,7 +165,7 @@ def test_what_is_wrong_with_several_cameras_is_said(overrides, said):
     ({"stages": ["torso", 3]}, "stages.1: found 3"), ({"cycles": 0}, "cycles: found 0"), ({"cycles": 101}, "cycles: found 101"),
     ({"cooling": 0}, "cooling"), ({"cooling": 1.1}, "cooling"), ({"explore": -1}, "explore"), ({"motion_weight": -1}, "motion_weight"),
     ({"motion_reach": 0}, "motion_reach"), ({"posture_weight": math.nan}, "posture_weight"),
-    ({"body": "ball"}, "body: found 'ball'; input should be 'cardbox', 'boxes', 'rounded', 'anatomical' or 'cylinders'"),
+    ({"body": "ball"}, "body: found 'ball'; input should be 'cardbox', 'cardbox_bends', 'boxes', 'rounded', 'anatomical' or 'cylinders'"),
     ({"resampling": "best"}, "resampling: found 'best'; input should be 'deterministic', 'stratified'"),
     ({"rank_by": None}, "rank_by: found None"), ({"torso_arms": "both"}, "input should be 'last' or 'hidden'"),
     ({"estimate": "median"}, "input should be 'best' or 'mean'"), ({"limits": 2}, "limits: found 2"),

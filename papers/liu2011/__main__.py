@@ -10,6 +10,7 @@ from papers.common.runner import main
 from papers.liu2011 import (
     algorithm_1,
     cardbox_cost,
+    elbows,
     figure_1_2,
     figure_3_4,
     figure_5,
@@ -23,12 +24,13 @@ from papers.liu2011 import (
     survival_sweep,
     table_1,
     toward_camera,
+    true_poses,
 )
 from papers.liu2011.material import SILHOUETTES
 
 ABOUT = "Z. Liu, D. Lee, W. Sepp (IROS 2011): every figure and table, on a made recording, or on --recording."
 MODULES = (figure_1_2, figure_3_4, figure_5, algorithm_1, table_1, figure_6_7, figure_8, figure_9, figure_10_12, toward_camera,
-           survival_sweep, particles_sweep, selectivity, frame_rate, cardbox_cost)  # fmt: skip
+           survival_sweep, particles_sweep, selectivity, frame_rate, cardbox_cost, elbows, true_poses)  # fmt: skip
 EXPERIMENTS = tuple(module.EXPERIMENT for module in MODULES)
 
 

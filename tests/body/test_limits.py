@@ -15,6 +15,10 @@ shoulder_forward   -30 100    0  17.2  40.1
 elbow_roll         -95  95    0  57.3  57.3
 elbow_flexion        0 150    0  68.8  68.8
 """
+BENDS = UPPER[: UPPER.index("elbow_roll")] + """
+elbow_aside       -150 150    0  68.8  68.8
+elbow_forward       -5 150    0  68.8  68.8
+"""
 WHOLE = """
 root_bow          -100 130    0     5    10
 root_tilt          -80  80    0     8     8
@@ -53,8 +57,8 @@ knee_flexion         0 155   10    10    30
 FREE = {"torso_y", "root_x", "root_y", "root_z", "root_heading"}
 
 
-@pytest.mark.parametrize(("name", "table"), [("cardbox", UPPER), ("boxes", UPPER), ("rounded", UPPER), ("anatomical", ANATOMICAL),
-                                             ("cylinders", CYLINDERS)])
+@pytest.mark.parametrize(("name", "table"), [("cardbox", UPPER), ("boxes", UPPER), ("rounded", UPPER), ("cardbox_bends", BENDS),
+                                             ("anatomical", ANATOMICAL), ("cylinders", CYLINDERS)])
 def test_people_bend_so_far(name, table):
     """Both sides alike; components of the right side's rotation vectors about x and z are those of the left with the other sign."""
     rows = {row.split()[0]: [float(value) for value in row.split()[1:]] for row in table.split("\n") if row}

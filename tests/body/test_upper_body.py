@@ -15,7 +15,7 @@ from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body, Hulls, Quads  # fmt: skip
 from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
 from shadowpuppet.body.skeleton import SIDES  # fmt: skip
-from shadowpuppet.body.upper_body import FOREARM, HAND_POINT, TO_TIP, boxes, cardbox, rounded  # fmt: skip
+from shadowpuppet.body.upper_body import FOREARM, HAND_POINT, TO_TIP, boxes, cardbox, cardbox_bends, rounded  # fmt: skip
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 
@@ -112,6 +112,28 @@ def test_bodies_are_linear_in_their_sizes_and_use_every_one(name, rng):
         assert np.abs(changed - a).max() > 1e-4, size
 
 
+def test_elbows_of_two_bends_reach_what_hinges_reach(rng):
+    """Every place of a hand up to a flexion of 135 degrees, from the same upper arm; straight arms among them."""
+    hinge, bends = cardbox(SIZES), cardbox_bends(SIZES)
+    poses = random_poses(rng, hinge.skeleton, 400)
+    names, (low, high) = hinge.skeleton.dof_names, bends.skeleton.limits
+    found = poses.copy()
+    for side in SIDES:
+        roll, flexion = (names.index(f"{side}_elbow_{what}") for what in ("roll", "flexion"))
+        poses[:, flexion] = np.minimum(poses[:, flexion], np.radians(135))
+        poses[:, roll] = np.clip(poses[:, roll], *np.radians([-93, 93]))  # beyond, a bent forearm is farther back than its limit
+        poses[:10, flexion] = 0.0
+        x, y, z = (np.sin(poses[:, flexion]) * np.cos(poses[:, roll]), np.sin(poses[:, flexion]) * np.sin(poses[:, roll]),
+                   np.cos(poses[:, flexion]))
+        over = np.abs(np.arctan2(y, z)) > high[roll]  # bent forward beyond a right angle
+        forward = np.where(over, np.pi - np.arcsin(x), np.arcsin(x))
+        found[:, roll], found[:, flexion] = np.where(over, np.arctan2(-y, -z), np.arctan2(y, z)), forward
+    assert (found >= low - 1e-9).all()
+    assert (found <= high + 1e-9).all()
+    hands = ["left_hand", "right_hand"]
+    np.testing.assert_allclose(bends.points(found, names=hands), hinge.points(poses, names=hands), atol=1e-12)
+
+
 # Shapes ---------------------------------------------------------------------------------------------------------------
 
 
@@ -187,7 +209,9 @@ def test_all_bodies_stand_on_the_same_skeleton_and_have_the_same_landmarks(name)
     body, paper = make_body(name, SIZES), cardbox(SIZES)
     assert body.name == name
     assert body.skeleton.joints == paper.skeleton.joints
-    assert body.skeleton.dofs == paper.skeleton.dofs
+    with_other_elbows = name == "cardbox_bends"
+    assert [dof for dof in body.skeleton.dofs if "elbow" not in dof.name] == [dof for dof in paper.skeleton.dofs if "elbow" not in dof.name]
+    assert (body.skeleton.dofs == paper.skeleton.dofs) is not with_other_elbows
     assert body.landmarks == paper.landmarks
     np.testing.assert_array_equal(body.hem, paper.hem)
     assert len(body.parts) == len(body.shapes.joints)
@@ -228,5 +252,5 @@ def test_a_mirrored_pose_has_mirrored_points(name, rng):
 
 
 def test_unknown_names_are_said_with_what_there_is():
-    with pytest.raises(ShadowPuppetError, match="unknown body 'ball'; there are: anatomical, boxes, cardbox, cylinders, rounded"):
+    with pytest.raises(ShadowPuppetError, match="unknown body 'ball'; there are: anatomical, boxes, cardbox, cardbox_bends, cyl"):
         make_body("ball", SIZES)

@@ -105,7 +105,7 @@ def test_sizes_are_kept_checked_and_grow_with_the_height(name):
         sizes.with_values(thigh_length=44.0)
     with pytest.raises(ShadowPuppetError, match=r"body 'cardbox': found .*Sizes, expected CardboxSizes"):
         make_body("cardbox", sizes)
-    with pytest.raises(ShadowPuppetError, match="unknown body 'ball'; there are: anatomical, boxes, cardbox, cylinders, rounded"):
+    with pytest.raises(ShadowPuppetError, match="unknown body 'ball'; there are: anatomical, boxes, cardbox, cardbox_bends, cyl"):
         sizes_kind("ball")
     assert set(MODELS) > set(WHOLE)
     assert kind_of(sizes) == name

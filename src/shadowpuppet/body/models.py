@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 from shadowpuppet.body.anthropometry import ANATOMICAL_SHARES, CYLINDER_SHARES, PROPORTIONS, SOLE, stature_of
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import AnatomicalSizes, BoneSizes, CardboxSizes, CylinderSizes, Sizes
-from shadowpuppet.body.upper_body import HAND_SHARE, WRIST_SHARE, boxes, cardbox, rounded
+from shadowpuppet.body.upper_body import HAND_SHARE, WRIST_SHARE, boxes, cardbox, cardbox_bends, rounded
 from shadowpuppet.body.whole_body import anatomical, cylinders
 from shadowpuppet.errors import ShadowPuppetError, choices
 
@@ -33,6 +33,7 @@ class BodyModel(NamedTuple):
 
 MODELS: dict[str, BodyModel] = {
     "cardbox": BodyModel(cardbox, CardboxSizes, PROPORTIONS),
+    "cardbox_bends": BodyModel(cardbox_bends, CardboxSizes, PROPORTIONS),
     "boxes": BodyModel(boxes, CardboxSizes, PROPORTIONS),
     "rounded": BodyModel(rounded, CardboxSizes, PROPORTIONS),
     "anatomical": BodyModel(anatomical, AnatomicalSizes, ANATOMICAL_SHARES),

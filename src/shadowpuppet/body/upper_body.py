@@ -1,7 +1,8 @@
 """Bodies of the upper body, made from 18 named sizes on one skeleton; each shape's silhouette is one convex polygon.
 
-`cardbox` is Liu 2011's model (III-A): two or three crossed rectangles a part. `boxes` is the volumetric model of its Fig. 1: a closed box a
-part. `rounded` is ours: hulls of ellipsoids, whose outline does not change as a limb rolls.
+`cardbox` is Liu 2011's model (III-A): two or three crossed rectangles a part; `cardbox_bends` has other angles at the elbows. `boxes` is
+the volumetric model of its Fig. 1: a closed box a part. `rounded` is ours: hulls of ellipsoids, whose outline does not change as a limb
+rolls.
 
 The body's frame is Liu 2011's: X toward the camera, Y to the image's right (the left of a person facing the camera), Z up.
 """
@@ -22,23 +23,28 @@ TWIST, BEND = "torso_twist", "torso_bend"
 """Degrees of freedom of the trunk: its turn about the vertical, and to the side."""
 
 
-def _arm(side: str, sizes: CardboxSizes) -> tuple[list[Joint], list[Dof]]:
+def _arm(side: str, sizes: CardboxSizes, bends: bool) -> tuple[list[Joint], list[Dof]]:
     """Joints and DOF of an arm, which hangs straight down, thumb forward, when all angles are zero.
 
     Abduction turns the arm in the frontal plane, forward out of that plane toward the front: every direction is reachable, and the
-    singular one is straight ahead, far from usual initial postures. Roll turns the elbow's hinge about the upper arm: 0 bends the forearm
-    forward, +90 degrees bends it up when the arm is level.
+    singular one is straight ahead, far from usual initial postures. The elbow is a hinge: roll turns it about the upper arm: 0 bends the
+    forearm forward, +90 degrees bends it up when the arm is level. While the arm is straight, roll is undetermined. With `bends` the elbow
+    bends aside and then forward, as the shoulder does: the same directions of the forearm, but for some at flexions beyond 135 degrees,
+    and a straight arm is regular.
     """
     out, turn = ("x", "z") if side == "left" else ("-x", "-z")
     y = (sizes.shoulder_width / 2 - sizes.shoulder_inset) * (1 if side == "left" else -1)
     z = sizes.torso_height - sizes.upper_arm_width / 2  # a level arm's upper edge lies on the torso's
     shoulder, elbow = f"{side}_shoulder", f"{side}_elbow"
     joints = [Joint(shoulder, "torso", (0.0, y, z)), Joint(elbow, shoulder, (0.0, 0.0, -sizes.upper_arm_length))]
+    hinge = [Dof(f"{side}_elbow_roll", elbow, turn, *np.radians([-95, 95]), spread=(1.0, 1.0)),
+             Dof(f"{side}_elbow_flexion", elbow, "-y", *np.radians([0, 150]), spread=(1.2, 1.2))]
+    both = [Dof(f"{side}_elbow_aside", elbow, out, *np.radians([-150, 150]), spread=(1.2, 1.2)),
+            Dof(f"{side}_elbow_forward", elbow, "-y", *np.radians([-5, 150]), spread=(1.2, 1.2))]
     dofs = [
         Dof(f"{side}_shoulder_abduction", shoulder, out, *np.radians([-40, 190]), rest=0.8, spread=(2.0, 2.0)),
         Dof(f"{side}_shoulder_forward", shoulder, "-y", *np.radians([-30, 100]), spread=(0.3, 0.7)),
-        Dof(f"{side}_elbow_roll", elbow, turn, *np.radians([-95, 95]), spread=(1.0, 1.0)),
-        Dof(f"{side}_elbow_flexion", elbow, "-y", *np.radians([0, 150]), spread=(1.2, 1.2)),
+        *(both if bends else hinge),
     ]
     return joints, dofs
 
@@ -48,10 +54,10 @@ SHOULDER_RISE = 0.012
 degrees (Ludewig et al. 2009)."""
 
 
-def upper_body_skeleton(sizes: CardboxSizes, clavicles: bool = False) -> Skeleton:
+def upper_body_skeleton(sizes: CardboxSizes, clavicles: bool = False, bends: bool = False) -> Skeleton:
     """The skeleton of Liu 2011 (III-A): 12 DOF d1..d12, four of the torso and four of each arm. The pelvis shifts along Y and twists;
-    the torso turns on it about the middle of its lower edge. With `clavicles` the shoulders follow the arms a little, which is not in
-    the paper."""
+    the torso turns on it about the middle of its lower edge. The paper does not say which two rotations an elbow has: a hinge that rolls,
+    or two `bends`. With `clavicles` the shoulders follow the arms a little, which is not in the paper."""
     joints = [Joint("pelvis", None), Joint("torso", "pelvis")]
     dofs = [
         Dof("torso_y", "pelvis", "y", kind="translation"),
@@ -60,7 +66,7 @@ def upper_body_skeleton(sizes: CardboxSizes, clavicles: bool = False) -> Skeleto
         Dof(BEND, "torso", "x", *np.radians([-50, 50]), spread=(0.25, 0.25)),
     ]
     for side in SIDES:
-        arm_joints, arm_dofs = _arm(side, sizes)
+        arm_joints, arm_dofs = _arm(side, sizes, bends)
         joints += arm_joints
         dofs += arm_dofs
     couplings = [coupling for side in SIDES for coupling in (
@@ -145,8 +151,8 @@ def _hem(sizes: CardboxSizes) -> Array:
     return np.array([[0.0, -sizes.waist_width / 2, -sizes.waist_height], [0.0, sizes.waist_width / 2, -sizes.waist_height]])
 
 
-def _of_quads(name: str, sizes: CardboxSizes, shapes: Mapping[str, list]) -> Body:
-    skeleton = upper_body_skeleton(sizes)
+def _of_quads(name: str, sizes: CardboxSizes, shapes: Mapping[str, list], bends: bool = False) -> Body:
+    skeleton = upper_body_skeleton(sizes, bends=bends)
     joint_of = {part.name: part.joint for part in _parts(sizes)}
     quads = [(part, quad) for part, part_quads in shapes.items() for quad in part_quads]
     joints = np.array([[skeleton.joint_index(joint_of[part])] for part, _ in quads], np.int64)
@@ -156,8 +162,16 @@ def _of_quads(name: str, sizes: CardboxSizes, shapes: Mapping[str, list]) -> Bod
 
 def cardbox(sizes: CardboxSizes) -> Body:
     """Liu 2011's cardbox model: 15 cards (III-A). The torso's third card lies across it at mid-height."""
-    shapes = {p.name: [p.front_card(), p.side_card()] + ([p.level_card()] if p.name == "torso" else []) for p in _parts(sizes)}
-    return _of_quads("cardbox", sizes, shapes)
+    return _of_quads("cardbox", sizes, _cards(sizes))
+
+
+def cardbox_bends(sizes: CardboxSizes) -> Body:
+    """The cardbox model with elbows of two bends in place of roll and flexion."""
+    return _of_quads("cardbox_bends", sizes, _cards(sizes), bends=True)
+
+
+def _cards(sizes: CardboxSizes) -> dict[str, list]:
+    return {p.name: [p.front_card(), p.side_card()] + ([p.level_card()] if p.name == "torso" else []) for p in _parts(sizes)}
 
 
 def boxes(sizes: CardboxSizes) -> Body:

@@ -98,9 +98,11 @@ class SilhouetteSets(NamedTuple):
     """Number of film frames from one set to the next."""
 
 
-def gather_silhouettes(rig: Rig, options: Options, listener: Listener) -> SilhouetteSets:
-    """Silhouettes of up to `SETS` sets, beginning with the first set in which two cameras see a person."""
+def gather_silhouettes(rig: Rig, options: Options, listener: Listener, whole: bool = False) -> SilhouetteSets:
+    """Silhouettes of up to `SETS` sets, beginning with the first set in which two cameras see a person; of the `whole` films, or as many
+    a second as tell delays."""
     every = max(1, min(round(rig.rate / MAX_SET_RATE), (rig.count or SETS * 9) // MIN_SETS))
+    every = max(every, (rig.count or 0) // SETS) if whole else every
     steps = Steps(listener, rig.names)
     with ThreadPoolExecutor(usable_cores(), "check") as pool:
         segments = [each.segmented for each in pool.map(lambda footage: _silhouettes(footage, options, steps), rig.footage)]

@@ -17,8 +17,9 @@ from shadowpuppet.pipeline.verdict.verdict import Verdict, verdict_of
 
 MOSTLY_LOST = 0.5
 """Share of the frames with a person above which a run that loses them is a failure, with an exit code of its own."""
-OFTEN_LOST, OFTEN_DOUBTFUL = 0.05, 0.4
-"""Shares of frames, lost (or without one of the cameras) and with a doubtful limb, above which a run is doubtful."""
+OFTEN_LOST, OFTEN_DOUBTFUL = 0.05, {1: 0.6, 2: 0.4}
+"""Shares of frames, lost (or without one of the cameras) and with a doubtful limb, above which a run is doubtful. With one camera, and not
+with two or more, most doubtful arms are right."""
 REMEDIES = {"late": "check its start", "early": "check its start", "frozen": "check its cable", "blind": "look at its film"}
 """What to do about a camera, by why it was set aside."""
 WIDE, FAR = {1: 0.105, 2: 0.05}, {1: 0.12, 2: 0.07}
@@ -73,7 +74,7 @@ def _cautions(motion: Motion, cameras: int) -> Iterator[Caution]:
     shares = {limb: float(np.isin(motion.limb_status[:, n], DOUBTFUL).mean()) for n, limb in enumerate(motion.limbs)}
     for limb, share in sorted(shares.items(), key=lambda item: -item[1]):
         short = f"{limb.replace('_', ' ')} doubtful in {100 * share:.0f} % of frames"
-        if share > OFTEN_DOUBTFUL:
+        if share > OFTEN_DOUBTFUL[kind]:
             yield Caution(short, short, HARMFUL)
         elif share > OFTEN_LOST:
             yield Caution(short, short, NOTED)

@@ -37,7 +37,7 @@ class MonocularSettings:
     """Settings of the one-camera tracker (Liu 2011). The values here are the default preset; `PRESETS` has the paper's."""
 
     body: BodyName = "rounded"
-    """The body's model: of the upper body (cardbox, boxes, rounded) or of the whole person."""
+    """The body's model: of the upper body (cardbox, cardbox_bends, boxes, rounded) or of the whole person."""
     resampling: Literal["deterministic", "stratified", "systematic", "multinomial", "residual"] = "deterministic"
     """DRS (Algorithm 4), SRS (Algorithm 3), or another scheme in SRS's place."""
     torso: PartSettings = PartSettings(particles=500)

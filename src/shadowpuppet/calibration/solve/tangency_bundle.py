@@ -1,0 +1,280 @@
+"""Places of cameras from the outlines of a moving person alone: epipolar tangency of every two cameras in every set, at once.
+
+The outermost planes through two camera centres that touch the person are the same for both cameras (Wong and Cipolla 2001; Sinha and
+Pollefeys 2010). Their distances in the pictures are minimised over all cameras' places and directions, robustly, beginning at a rough
+calibration, which is also a weak prior: it decides what outlines do not show, the world's frame and scale.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.calibration.epipolar_tangency import MAX_ANGULAR_EXTENT
+from shadowpuppet.calibration.silhouettes import Row
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.errors import CalibrationError
+from shadowpuppet.geometry import Array, rigid, rotation_from_vector
+from shadowpuppet.threads import one_blas_thread
+
+ROUGH_ANGLE, ROUGH_PLACE = np.radians(10.0), 0.5
+"""Standard deviations of a rough calibration's directions (rad) and places (m) along each axis."""
+LOSS_SCALES = (16.0, 4.0, 1.5)
+"""Scales (pixels of a picture 1000 wide) of the soft L1 loss, one after another: first all tangents count, then those of a limb that a
+silhouette lacks less and less."""
+FAR_PIXELS = 5.0
+"""Distance of tangents, pixels of a picture 1000 wide, that is not an outline's noise."""
+LEAST_TANGENTS = 30
+"""Least number of tangents per camera."""
+STEPS = 40
+"""Greatest number of steps with each loss."""
+NUDGE = 1e-5
+"""Difference of the numeric derivatives, rad and m."""
+BLOCKS = 20
+"""Number of parts of the film whose disagreement tells the standard deviations."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TangencyFit:
+    """Cameras that were placed by outlines."""
+
+    cameras: tuple[Camera, ...]
+    before: Array
+    """Median distance of each camera's tangents from the others', of shape (C,), pixels, as calibrated; NaN without any."""
+    after: Array
+    """The same as placed now."""
+    place_sd: Array
+    """Standard deviations of the cameras' centres within the rig, of shape (C,), metres: root of the trace."""
+    angle_sd: Array
+    """The same of their directions, of shape (C,), radians."""
+    tangents: int
+    """Number of pairs of tangents compared."""
+    far: float
+    """Share of these that are over `FAR_PIXELS` apart."""
+
+
+class _Hulls(NamedTuple):
+    """The convex hull of every silhouette as its camera sees it; the last corner is repeated."""
+
+    rays: Array
+    """Unit directions in the camera's frame, of shape (F, K, 3)."""
+    firm: NDArray[np.bool_]
+    """Whether each lies far from the picture's border, of shape (F, K); none of a silhouette that is missing."""
+    focal: float
+    """Pixels per radian near the middle."""
+
+
+class _Pair(NamedTuple):
+    first: int
+    second: int
+    sets: NDArray[np.int64]
+    """Those in which both have a silhouette, of shape (P,)."""
+
+
+@one_blas_thread()
+def place_by_outlines(cameras: Sequence[Camera], rows: Sequence[Row], free: Sequence[int] | None = None, *,
+                      rough: tuple[float, float] = (ROUGH_ANGLE, ROUGH_PLACE)) -> TangencyFit:
+    """The cameras whose tangents agree best in sets of silhouettes.
+
+    free: indices of the cameras that may move, by default all. rough: standard deviations of the given directions (rad) and places (m).
+    Lenses stay as they are. Raises `CalibrationError` if a free camera has too few tangents in common with others.
+    """
+    free = range(len(cameras)) if free is None else free
+    hulls = [_hulls(camera, [row[n] for row in rows]) for n, camera in enumerate(cameras)]
+    pairs = [_Pair(i, j, both) for i, j in combinations(range(len(cameras)), 2)
+             if len(both := np.flatnonzero(hulls[i].firm.any(1) & hulls[j].firm.any(1)))]
+    found = [_distances(cameras, hulls, pair) for pair in pairs]
+    _check(cameras, pairs, found, free)
+    size = max(max(camera.size) for camera in cameras) / 1000
+    now, value = list(cameras), np.zeros((len(cameras), 6))
+    for scale in LOSS_SCALES:
+        value = _minimised(cameras, hulls, pairs, value, free, scale * size, rough)
+    now = _moved(cameras, value)
+    last = [_distances(now, hulls, pair) for pair in pairs]
+    place_sd, angle_sd = _deviations(now, hulls, pairs, free, LOSS_SCALES[-1] * size)
+    values = np.concatenate([each[np.isfinite(each)] for each in last])
+    return TangencyFit(cameras=tuple(now), before=_medians(len(cameras), pairs, found), after=_medians(len(cameras), pairs, last),
+                       place_sd=place_sd, angle_sd=angle_sd, tangents=len(values), far=float((np.abs(values) > FAR_PIXELS * size).mean()))
+
+
+def _check(cameras: Sequence[Camera], pairs: Sequence[_Pair], found: Sequence[Array], free: Sequence[int]) -> None:
+    for n in free:
+        count = sum(int(np.isfinite(each).sum()) for pair, each in zip(pairs, found) if n in pair[:2])
+        if count < LEAST_TANGENTS:
+            raise CalibrationError(f"camera {cameras[n].name!r}: found {count} tangents that other cameras see, too, expected at least "
+                                   f"{LEAST_TANGENTS}: the person must be whole in the picture more often")
+
+
+def _hulls(camera: Camera, silhouettes: Sequence) -> _Hulls:
+    import cv2
+
+    corners = []
+    for each in silhouettes:
+        if each is None:
+            corners.append((np.tile([[0.0, 0.0, 1.0]], (1, 1)), np.zeros(1, bool)))
+            continue
+        pixels, firm = each.contour
+        rays = camera.rays(pixels)
+        hull = cv2.convexHull(rays[:, :2].astype(np.float32), returnPoints=False).ravel()
+        corners.append((rays[hull] / np.linalg.norm(rays[hull], axis=1, keepdims=True), firm[hull]))
+    most = max((len(rays) for rays, _ in corners), default=1)
+    pad = [(np.concatenate([rays, np.repeat(rays[-1:], most - len(rays), 0)]), np.r_[firm, np.repeat(firm[-1:], most - len(firm))])
+           for rays, firm in corners]
+    return _Hulls(np.array([rays for rays, _ in pad]), np.array([firm for _, firm in pad]), float(np.diag(camera.matrix)[:2].mean()))
+
+
+def _distances(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pair: _Pair) -> Array:
+    """Signed distances (P, 2) of both pairs of outermost tangents, pixels; NaN at a picture's border, or where a baseline runs through or
+    along the person."""
+    out = np.full((len(pair.sets), 2), np.nan)
+    one, other = (cameras[n] for n in pair[:2])
+    line = other.centre - one.centre
+    length = float(np.linalg.norm(line))
+    if length < 1e-9:
+        return out
+    line = line / length
+    aside = [rays - (rays @ line)[..., None] * line
+             for rays in (hulls[n].rays[pair.sets] @ cameras[n].T_camera_world[:3, :3] for n in pair[:2])]
+    ahead = sum(_unit(each.sum(1)) for each in aside)
+    ahead = _unit(np.where(np.linalg.norm(ahead, axis=1, keepdims=True) > 1e-6, ahead, aside[0].sum(1)))
+    up, sets = np.cross(line, ahead), np.arange(len(out))
+    angles = [np.arctan2((each * up[:, None]).sum(2), (each * ahead[:, None]).sum(2)) for each in aside]
+    usable = np.maximum(*(np.ptp(each, axis=1) for each in angles)) <= MAX_ANGULAR_EXTENT
+    for n, pick in enumerate((np.argmin, np.argmax)):
+        at = [pick(each, axis=1) for each in angles]
+        firm = usable & hulls[pair.first].firm[pair.sets, at[0]] & hulls[pair.second].firm[pair.sets, at[1]]
+        lever = sum(hulls[k].focal * np.linalg.norm(each[sets, where], axis=1) for k, each, where in zip(pair[:2], aside, at)) / 2
+        out[:, n] = np.where(firm, (angles[0][sets, at[0]] - angles[1][sets, at[1]]) * lever, np.nan)
+    return out
+
+
+def _minimised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], start: Array, free: Sequence[int],
+               scale: float, rough: tuple[float, float]) -> Array:
+    """Increments (C, 6) of the cameras, of least loss, by Levenberg's and Marquardt's method with reweighting."""
+    value, damping = start, 1e-3
+    prior = np.tile(np.repeat(1 / np.square(rough), 3), len(free))
+    places = [6 * n + k for n in free for k in range(6)]
+    found = [_distances(_moved(cameras, value), hulls, pair) for pair in pairs]
+    cost = _loss(found, scale) + float((prior * value.ravel()[places] ** 2).sum()) / 2
+    for _ in range(STEPS):
+        H, g = _normal(_linearised(cameras, hulls, pairs, value, found), value.size, scale)
+        H, g = H[np.ix_(places, places)] + np.diag(prior), g[places] + prior * value.ravel()[places]
+        better = False
+        for _ in range(8):
+            step = np.linalg.solve(H + damping * np.diag(np.diag(H)), -g)
+            tried = value.copy()
+            tried.ravel()[places] += step
+            new = [_distances(_moved(cameras, tried), hulls, pair) for pair in pairs]
+            least = _loss(new, scale) + float((prior * tried.ravel()[places] ** 2).sum()) / 2
+            if least < cost:
+                gain, better = (cost - least) / cost, True
+                value, found, cost, damping = tried, new, least, max(damping / 10, 1e-9)
+                break
+            damping *= 10
+        if not better or gain < 1e-6:
+            break
+    return value
+
+
+def _loss(found: Sequence[Array], scale: float) -> float:
+    """Soft L1 loss of distances, in units of one pixel's square. What cannot be compared costs as much as `scale`: else cameras would be
+    placed where little can be."""
+    values = np.concatenate([each.ravel() for each in found])
+    known = np.nan_to_num(values, nan=scale)
+    return float((scale**2 * (np.sqrt(1 + (known / scale) ** 2) - 1)).sum())
+
+
+class _Linear(NamedTuple):
+    """A pair's distances to first order."""
+
+    columns: NDArray[np.int64]
+    """Of both cameras' increments, of shape (12,)."""
+    slopes: Array
+    """Of shape (12, K), for K known distances."""
+    values: Array
+    """Of shape (K,), pixels."""
+    sets: NDArray[np.int64]
+    """Of shape (K,)."""
+
+
+def _linearised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], value: Array,
+                found: Sequence[Array]) -> Iterator[_Linear]:
+    """The distances `found` at increments (C, 6) and, by differences, their derivatives."""
+    now = _moved(cameras, value)
+    nudged = [[_moved_one(camera, own + step) for step in np.eye(6) * NUDGE] for camera, own in zip(cameras, value)]
+    for pair, base in zip(pairs, found):
+        known = np.isfinite(base)
+        slopes = np.zeros((12, known.sum()))
+        for side, n in enumerate(pair[:2]):
+            for k in range(6):
+                there = [*now[:n], nudged[n][k], *now[n + 1 :]]
+                slopes[6 * side + k] = np.nan_to_num((_distances(there, hulls, pair)[known] - base[known]) / NUDGE)
+        columns = np.r_[6 * pair.first + np.arange(6), 6 * pair.second + np.arange(6)]
+        yield _Linear(columns, slopes, base[known], np.repeat(pair.sets[:, None], 2, 1)[known])
+
+
+def _normal(parts: Iterable[_Linear], size: int, scale: float) -> tuple[Array, Array]:
+    """Normal equations (size, size) and gradient (size,) of the loss."""
+    H, g = np.zeros((size, size)), np.zeros(size)
+    for part in parts:
+        weighted = part.slopes / np.sqrt(1 + (part.values / scale) ** 2)
+        H[np.ix_(part.columns, part.columns)] += weighted @ part.slopes.T
+        g[part.columns] += weighted @ part.values
+    return H, g
+
+
+def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], free: Sequence[int],
+                scale: float) -> tuple[Array, Array]:
+    """Standard deviations of centres (C,), m, and directions (C,), rad, from how much parts of the film would move them (a "sandwich" of
+    gradients by blocks of sets: neighbouring silhouettes err together). If all cameras are free, within the rig: not of what a motion or
+    a scale of the whole rig changes."""
+    found = [_distances(cameras, hulls, pair) for pair in pairs]
+    parts, size, last = list(_linearised(cameras, hulls, pairs, np.zeros((len(cameras), 6)), found)), 6 * len(cameras), 0
+    H, _ = _normal(parts, size, scale)
+    last = max(int(pair.sets[-1]) for pair in pairs) + 1
+    blocks = np.zeros((BLOCKS, size))
+    for part in parts:
+        pulls = part.slopes * (part.values / np.sqrt(1 + (part.values / scale) ** 2))
+        for k, column in enumerate(part.columns):
+            blocks[:, column] += np.bincount(part.sets * BLOCKS // last, pulls[k], BLOCKS)
+    places = [6 * n + k for n in free for k in range(6)]
+    basis = np.linalg.svd(_whole_rig(cameras).T)[2][7:].T if len(free) == len(cameras) else np.eye(len(places))
+    spread = basis @ np.linalg.pinv(basis.T @ H[np.ix_(places, places)] @ basis, hermitian=True) @ basis.T @ blocks[:, places].T
+    own = np.zeros(size)
+    own[places] = (spread**2).sum(1) * BLOCKS / (BLOCKS - 1)
+    return np.sqrt(own.reshape(-1, 6)[:, 3:].sum(1)), np.sqrt(own.reshape(-1, 6)[:, :3].sum(1))
+
+
+def _whole_rig(cameras: Sequence[Camera]) -> Array:
+    """Increments (6 C, 7) of all cameras by which the rig turns, moves and grows as a whole."""
+    columns = []
+    for axis in np.eye(3):
+        columns.append([np.r_[camera.T_camera_world[:3, :3] @ axis, np.zeros(3)] for camera in cameras])
+        columns[-1] = [each + np.r_[np.zeros(3), -np.cross(each[:3], camera.T_camera_world[:3, 3])] for each, camera in zip(columns[-1], cameras)]
+        columns.append([np.r_[np.zeros(3), camera.T_camera_world[:3, :3] @ axis] for camera in cameras])
+    columns.append([np.r_[np.zeros(3), camera.T_camera_world[:3, 3]] for camera in cameras])
+    return np.array([np.concatenate(each) for each in columns]).T
+
+
+def _moved(cameras: Sequence[Camera], value: Array) -> list[Camera]:
+    return [_moved_one(camera, own) if own.any() else camera for camera, own in zip(cameras, value)]
+
+
+def _moved_one(camera: Camera, increment: Array) -> Camera:
+    """The camera turned about its centre by a rotation vector and then moved, both (3,) along its axes, rad and m."""
+    return replace(camera, T_camera_world=rigid(rotation_from_vector(increment[:3]), increment[3:]) @ camera.T_camera_world)
+
+
+def _medians(count: int, pairs: Sequence[_Pair], found: Sequence[Array]) -> Array:
+    own = [np.concatenate([np.abs(each[np.isfinite(each)]) for pair, each in zip(pairs, found) if n in pair[:2]] or [np.zeros(0)])
+           for n in range(count)]
+    return np.array([np.median(each) if len(each) else np.nan for each in own])
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)

@@ -1,0 +1,158 @@
+"""Cameras placed by a walking person alone: outlines refine a rough calibration, the height gives the scale, the feet the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.calibration.silhouettes import Row
+from shadowpuppet.calibration.solve.tangency_bundle import TangencyFit, place_by_outlines
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.errors import CalibrationError
+from shadowpuppet.geometry import Array, evenly_spread, inverse, rigid, rotation_from_vector, unit
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.repair.check import gather_silhouettes
+from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
+
+SETS = 90
+"""Number of sets, over all of the films, whose outlines are compared."""
+STANDING = 80
+"""Percentile of the heights of the visual hull that counts as the person's: walking and bending people are lower."""
+EXTREMES = 4
+"""Number of the hull's points whose mean is its top, or its bottom."""
+LEVEL_SD, SOLE_SD = np.radians(5.0), 0.02
+"""Standard deviations of a rough calibration's vertical, rad, and of a hull's lowest place over the floor, metres."""
+LEAST_POINTS, LEAST_HULLS = 50, 10
+"""Least number of points of a hull, and of hulls, whose ends are used."""
+DOUBT_FACTOR = 3.0
+"""Factor on the fit's standard deviations: silhouettes err alike in all of a film, which it does not know."""
+MAX_PLACE_SD, MAX_ANGLE_SD = 0.02, np.radians(0.5)
+"""Standard deviations of a camera's place, metres, and direction, rad, that are not remarked on, times `DOUBT_FACTOR`."""
+MANY_FAR = 0.15
+"""Share of tangents that are far apart (`TangencyFit.far`) that is remarked on."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Placed:
+    """Cameras as a person's outlines place them."""
+
+    cameras: tuple[Camera, ...]
+    """In metres, z up from the floor."""
+    fit: TangencyFit
+    """Before scale and floor."""
+    sets: int
+    """Number of sets of silhouettes compared."""
+    scale: float
+    """Factor on the rough calibration's lengths."""
+    tilt: float
+    """Angle between the rough calibration's vertical and the floor's, rad."""
+    advice: tuple[str, ...]
+    """What to doubt, a sentence each; none if all is well."""
+
+
+def place_cameras(rig: Rig, options: Options, listener: Listener | None = None) -> Placed:
+    """The places and directions of cameras with known lenses and rough places, from the person in their films.
+
+    The scale is the one at which the person is as tall as `options.height` or the recording's; without, the rough calibration's. Raises
+    `CalibrationError` if too little of the person is seen by two cameras at a time, or a camera's rough place is not known.
+    """
+    for camera in rig.cameras:
+        if not camera.oriented:
+            raise CalibrationError(f"camera {camera.name!r}: found only a field of view, expected also where it stands, roughly")
+    listener = listener or Listener()
+    rows = gather_silhouettes(rig, options, listener, whole=True).rows
+    rows = [rows[n] for n in evenly_spread(len(rows), SETS)]
+    listener.begin("placing the cameras")
+    fit = place_by_outlines(rig.cameras, rows)
+    listener.begin("floor and height")
+    ends = _ends(fit.cameras, rows)
+    height = options.height or rig.recording.subject.height
+    scale = 1.0
+    if ends is not None:
+        level, tilt = _floor(ends)
+        tall = float(np.percentile(_above(level, ends.top), STANDING))
+        scale = height / tall if height is not None else 1.0
+        cameras = tuple(_seen_from(camera, level, scale) for camera in fit.cameras)
+    else:
+        cameras, tilt = fit.cameras, 0.0
+    return Placed(cameras=cameras, fit=fit, sets=len(rows), scale=scale, tilt=tilt,
+                  advice=tuple(_advice(fit, scale, ends is None, height is None)))
+
+
+class _Ends(NamedTuple):
+    """The lowest and highest places of the person, one a set."""
+
+    bottom: Array
+    """Of shape (F, 3), metres."""
+    top: Array
+    """Of shape (F, 3), metres."""
+
+
+def _ends(cameras: Sequence[Camera], rows: Sequence[Row]) -> _Ends | None:
+    """The ends of the visual hulls; None if there are too few hulls."""
+    hull, bottom, top = VisualHull(cameras), [], []
+    for row in rows:
+        points = hull.points([None if silhouette is None else silhouette.mask for silhouette in row]).points
+        if len(points) >= LEAST_POINTS:
+            order = points[np.argsort(points[:, 2])]
+            bottom.append(order[:EXTREMES].mean(0))
+            top.append(order[-EXTREMES:].mean(0))
+    return _Ends(np.array(bottom), np.array(top)) if len(bottom) >= LEAST_HULLS else None
+
+
+def _floor(ends: _Ends) -> tuple[Array, float]:
+    """The motion (4, 4) of the world that puts the lowest places on z = 0, and its tilt (rad). A plane is fitted to them robustly; where
+    they lie along a line or at one place, the rough calibration's vertical decides (a prior)."""
+    from scipy.optimize import least_squares
+
+    middle = np.median(ends.bottom, axis=0)
+    away = ends.bottom - middle
+
+    def misfit(plane: Array) -> Array:
+        return (away[:, 2] - away[:, :2] @ plane[:2] - plane[2]) / SOLE_SD
+
+    def cost(plane: Array) -> Array:
+        robust = np.sqrt(2 * (np.sqrt(1 + misfit(plane) ** 2) - 1))  # soft L1, beside a quadratic prior
+        return np.r_[robust, plane[:2] / np.tan(LEVEL_SD)]
+
+    plane = least_squares(cost, np.zeros(3)).x
+    up = unit(np.array([-plane[0], -plane[1], 1.0]))
+    axis = np.cross(up, [0.0, 0.0, 1.0])
+    sine, angle = float(np.linalg.norm(axis)), float(np.arccos(np.clip(up[2], -1, 1)))
+    R = rotation_from_vector(axis / sine * angle) if sine > 1e-9 else np.eye(3)
+    ground = middle + [0.0, 0.0, plane[2]]
+    keep = np.array([ground[0], ground[1], 0.0])
+    return rigid(R, keep - R @ ground), angle
+
+
+def _above(level: Array, places: Array) -> Array:
+    """Heights (F,) over the floor."""
+    return places @ level[2, :3] + level[2, 3]
+
+
+def _seen_from(camera: Camera, level: Array, scale: float) -> Camera:
+    """The camera in the world moved by `level` (4, 4) and grown by `scale`."""
+    T = camera.T_camera_world @ inverse(level)
+    T[:3, 3] *= scale
+    return replace(camera, T_camera_world=T)
+
+
+def _advice(fit: TangencyFit, scale: float, no_floor: bool, no_height: bool) -> list[str]:
+    said = []
+    if fit.far > MANY_FAR:
+        said.append(f"{100 * fit.far:.0f} % of the tangents do not fit: are the films in step (`shadowpuppet check`), and are silhouettes "
+                    "whole? a leg that is missing in one camera moves all others")
+    for camera, place, angle in zip(fit.cameras, DOUBT_FACTOR * scale * fit.place_sd, DOUBT_FACTOR * fit.angle_sd):
+        if place > MAX_PLACE_SD or angle > MAX_ANGLE_SD:
+            said.append(f"camera {camera.name!r} is known to {1000 * place:.0f} mm and {np.degrees(angle):.1f} degrees only: film a person "
+                        "who walks through all of the room, bends and reaches")
+    if no_floor:
+        said.append("the floor is not known: the person is hardly ever whole in two pictures")
+    if no_height:
+        said.append("the scale is the rough calibration's: state the person's --height, in metres with shoes on")
+    return said
