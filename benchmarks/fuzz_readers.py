@@ -4,9 +4,9 @@
 
 Files that the package and the tests' writers make are changed at random, in their bytes and in their structure (numbers, words, lines,
 members of archives), and read in another process. A finding is any exception but a `ShadowPuppetError`; a message of more than
-one line, or too long; a warning that is not ours; more than 10 s; more than 500 MB; the end of the process. Each is printed with its
-reader, number and cause, and its input is kept in FOLDER. An input is made from the seed, the reader's name and its number alone. Ends
-with code 1 if there is a finding. Needs Linux.
+one line, or too long; a warning that is not ours; more than 10 s of computing, or ten times that of waiting; more than 500 MB; the end
+of the process. Each is printed with its reader, number and cause, and its input is kept in FOLDER. An input is made from the seed, the
+reader's name and its number alone. Ends with code 1 if there is a finding. Needs Linux.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ from shadowpuppet.errors import LONGEST, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.threads import child_environment
 
 SECONDS, MEMORY = 10, 500_000_000
-"""Time and memory that one input may take."""
+"""Computing time and memory that one input may take."""
+WAITING = 10 * SECONDS
+"""Time by the clock that one input may take: on a crowded machine a reader waits for its turn."""
 AT_ONCE, FEW = 200, 25
 """Inputs of a reader before it is the next one's turn; in a short run."""
 IN_MEMORY = Path("/dev/shm")
@@ -114,7 +116,7 @@ def ask(child: subprocess.Popen[str], name: str, folder: Path, first: int, numbe
     if line := child.stdout.readline():
         return [Report(*each) for each in json.loads(line)]
     code, at = child.wait(), int((folder / AT).read_text())
-    cause = f"more than {SECONDS} s" if code == -signal.SIGALRM else f"the process ended with code {code}"
+    cause = f"more than {SECONDS} s" if code in (-signal.SIGPROF, -signal.SIGALRM) else f"the process ended with code {code}"
     return [*(Report(n, "") for n in range(first, at)), Report(at, cause)]
 
 
@@ -173,8 +175,9 @@ def prepare(seeds: Path, place: Path, names: list[str], read: Callable[[Path], o
 
 def cause_of(read: Callable[[Path], object], file: Path) -> str:
     """What is wrong about reading a file; empty for nothing."""
-    before, began = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.monotonic()
-    signal.alarm(SECONDS + 1)
+    before, began = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
+    signal.setitimer(signal.ITIMER_PROF, SECONDS + 1)
+    signal.alarm(WAITING)
     cause = ""
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -186,12 +189,13 @@ def cause_of(read: Callable[[Path], object], file: Path) -> str:
                 cause = f"a message of {len(text)} characters: {text[:80]!r}"
         except Exception as error:
             cause = f"{type(error).__name__}: {str(error)[:200]}"
+    signal.setitimer(signal.ITIMER_PROF, 0)
     signal.alarm(0)
     others = [each for each in said if not issubclass(each.category, ShadowPuppetWarning)]
     if others:
         cause = cause or f"{others[0].category.__name__}: {others[0].message} ({others[0].filename}:{others[0].lineno})"
-    if time.monotonic() - began > SECONDS:
-        cause = cause or f"{time.monotonic() - began:.1f} s"
+    if time.process_time() - began > SECONDS:
+        cause = cause or f"{time.process_time() - began:.1f} s"
     grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
     return cause or (f"{grown / 1e6:.0f} MB" if grown > MEMORY else "")
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from itertools import combinations
 
+import made_rig
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from shadowpuppet.calibration.time_offset import QUANTILE, _compared, _half_width, _Pair, _solved
+from shadowpuppet.calibration.silhouettes import silhouettes_of
+from shadowpuppet.calibration.time_offset import QUANTILE, _compared, _half_width, _Pair, _solved, time_offsets
 
 LATE = (0.0, 4.0, -2.0, 1.0)
 
@@ -91,3 +93,48 @@ def test_a_width_falls_with_pairs_that_agree_and_grows_with_those_that_do_not():
     assert _half_width([0.0], [4.0]) == pytest.approx(QUANTILE * 2)
     assert _half_width([0.0] * 2, [4.0] * 2) == _half_width([0.0] * 3, [4.0] * 3) == pytest.approx(QUANTILE * np.sqrt(2))
     assert _half_width([2.0] * 4, [0.0] * 4) == pytest.approx(QUANTILE * 1.4826)
+
+
+# From silhouettes
+
+
+@pytest.fixture(scope="module")
+def masks(cameras):
+    return made_rig.masks(cameras, 70)
+
+
+def silhouettes(rows):
+    return [silhouettes_of(row) for row in rows]
+
+
+@pytest.mark.parametrize("late", [(0, 0, 0, 0), (0, 4, 0, 0), (0, 0, -3, 0), (0, 2, 0, -5)])
+def test_frames_by_which_films_are_late(cameras, masks, late):
+    found = time_offsets(cameras, silhouettes(made_rig.shifted(masks, late)))
+    np.testing.assert_allclose(found.frames, late, atol=0.15)
+    assert max(found.spread) < 0.15
+    assert found.pairs[0][1] == pytest.approx(late[1] - late[0], abs=0.15)
+    assert found.pairs[1][0] == pytest.approx(late[0] - late[1], abs=0.15)
+
+
+def test_half_frames_are_reported(cameras):
+    masks = made_rig.masks(cameras, 120)
+    rows = [[masks[20 + 2 * f - (3 if k == 1 else 0)][k] for k in range(4)] for f in range(45)]  # every second: 1.5 sets
+    np.testing.assert_allclose(time_offsets(cameras, silhouettes(rows)).frames, (0, 1.5, 0, 0), atol=0.25)
+
+
+def test_two_cameras_are_distinguished_only(cameras, masks):
+    found = time_offsets(cameras[:2], silhouettes([row[:2] for row in made_rig.shifted(masks, (0, 4, 0, 0))]))
+    assert found.frames[0] == 0
+    assert found.frames[1] == pytest.approx(4, abs=0.15)
+
+
+def test_a_camera_that_was_moved_a_little_is_not_late(cameras, masks):
+    wrong = [cameras[0], made_rig.moved(cameras[1], right=2), *cameras[2:]]
+    np.testing.assert_allclose(time_offsets(wrong, silhouettes(made_rig.shifted(masks, (0, 3, 0, 0)))).frames, (0, 3, 0, 0), atol=0.6)
+
+
+def test_a_person_who_stands_still_tells_nothing(cameras, masks):
+    still = silhouettes([masks[0]] * 50)
+    assert time_offsets(cameras, still).frames == (None,) * 4
+    assert time_offsets(cameras, still[:10]).frames == (None,) * 4
+    assert time_offsets(cameras, [[None] * 4] * 50).frames == (None,) * 4

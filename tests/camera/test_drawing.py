@@ -34,8 +34,10 @@ def a_picture(distance: float = 2.0, body: str = "cardbox") -> Picture:
 
 
 def a_pose(picture: Picture, **angles: float) -> Array:
-    level = {"left_shoulder_abduction": 1.5, "right_shoulder_abduction": 1.2, "left_elbow_flexion": 0.6}
-    return picture.body.skeleton.pose(**level | angles)
+    """Arms held out, the left forearm forward; a hinge's flexion is a bend forward where the body has that instead."""
+    level = {"left_shoulder_abduction": 1.5, "right_shoulder_abduction": 1.2, "left_elbow_flexion": 0.6} | angles
+    bends = "left_elbow_forward" in picture.body.skeleton.dof_names
+    return picture.body.skeleton.pose(**{name.replace("flexion", "forward") if bends else name: angle for name, angle in level.items()})
 
 
 def a_scene(rng, picture: Picture) -> tuple[np.ndarray, np.ndarray]:
@@ -62,6 +64,16 @@ def test_the_middle_row_is_the_cost_in_colours(rng):
                           drawing.BLACK: ~model & ~mask}.items():
         np.testing.assert_array_equal((middle == colour).all(2), where & ~ignore)
         assert where.any()
+
+
+def test_words_beside_each_other_are_lines_of_text_that_go_on_where_the_last_one_ended():
+    both = np.zeros((2, 60, 300, 3), np.uint8)
+    words = [("left", drawing.WHITE), ("right of it", (10, 200, 30))]
+    drawing.write_words(both[0], 7, words, 240)
+    end = drawing.write_text(both[1], "left", 7, drawing.WHITE, size=240)
+    assert both[1].any((0, 2)).nonzero()[0].max() < end
+    drawing.write_text(both[1], "right of it", 7, (10, 200, 30), end, 240)
+    np.testing.assert_array_equal(*both)
 
 
 @given(st.integers(0, 2**36 - 1))

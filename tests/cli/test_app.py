@@ -179,10 +179,6 @@ def test_what_a_message_quotes_is_printed_as_it_is(capsys):
     assert lines == ["reading [red]films[/red] of [bold]", "warning: camera '[dim]' is late", "warning: no pictures from [/dev/video0]"]
 
 
-def test_quiet_is_quiet(shell, recording):
-    assert shell("track", recording, "-o", "run", "--quiet", *QUICK) == (0, "", "")
-
-
 def test_info_looks_and_leaves_nothing(shell, recording, tmp_path):
     code, out, err = shell("info", recording)
     assert (code, err) == (0, "")
@@ -275,7 +271,7 @@ def test_settings_are_a_file_of_settings(shell, recording, tmp_path):
     assert code == 0
     assert make_options(tomllib.loads(out)) == make_options({"preset": "liu2011"})
     (tmp_path / "mine.toml").write_text(out)
-    assert shell("track", recording, "-o", "run", "--quiet", "--config", "mine.toml", "--seed", "5", *QUICK)[0] == 0
+    assert shell("track", recording, "-o", "run", "--quiet", "--config", "mine.toml", "--seed", "5", *QUICK) == (0, "", "")
     info = read_run(tmp_path / "run").info
     assert info["settings"]["seed"] == 5
     assert info["settings"]["tracker"]["body"] == make_options({"preset": "liu2011"}).tracker.body
@@ -372,16 +368,19 @@ def test_nobody_in_the_film(shell, spoilt, tmp_path):
     code, out, err = shell("track", spoilt, "-o", "run")
     assert code == 2
     assert out.startswith("verdict  bad\nbecause  the silhouette is empty in 100 % of the frames")
-    assert "silhouettes  0.0 % of the picture" in shell("track", spoilt, "-o", "run", "--verbose")[1]  # what was seen is shown
     assert err.startswith("error: ")
     assert "the silhouette is empty in 100 % of the frames: nobody is in the picture" in err
     assert not (tmp_path / "run").exists()
-    assert "the silhouette is empty" in refused(shell, "info", spoilt)
+    code, out, err = shell("info", spoilt, "--verbose")
+    assert code == 2
+    assert "silhouettes  0.0 % of the picture" in out  # what was seen is shown
+    assert "the silhouette is empty" in err
 
 
-def test_silhouettes_of_everything(shell, spoilt):
+def test_silhouettes_of_everything(shell, spoilt, tmp_path):
     made.write_film(spoilt / "masks" / "cam.mkv", [np.full(made.SIZE[::-1], 255, np.uint8)] * made.FRAMES, lossless=True)
     assert "nearly all of the picture is silhouette in 100 % of the frames" in refused(shell, "track", spoilt, "--masks")
+    assert not (tmp_path / "run-spoilt").exists()
 
 
 def test_a_person_partly_outside(shell, spoilt, tmp_path):
@@ -391,7 +390,9 @@ def test_a_person_partly_outside(shell, spoilt, tmp_path):
     assert code == 0
     assert "person is cut off at the left: step back" in out
     assert "warning: the silhouette touches the left border in" in err
-    assert len(read_run(tmp_path / "run").motion) == made.FRAMES
+    motion = read_run(tmp_path / "run").motion
+    assert len(motion) == made.FRAMES
+    assert np.isfinite(motion.joints[motion.status == "tracked"]).all()
 
 
 def test_no_references_no_height_no_distance(shell, recording, tmp_path):
@@ -408,13 +409,6 @@ def test_a_distance_that_the_references_do_not_bear_out(shell, recording):
     said = refused(shell, "info", recording, "--distance", "18", "--height", "1.75")
     assert "tiny: distance: found 18 metres, expected at most 2." in said
     assert "np.float64" not in said
-
-
-def test_references_in_the_wrong_posture(shell, spoilt):
-    for name in ("front_t_pose", "front_arms_t_pose"):
-        source = spoilt / "references" / "side_arms_hanging.png"
-        (spoilt / "references" / f"{name}.png").write_bytes(source.read_bytes())
-    assert "references/front_t_pose.png: not the posture front_t_pose, it seems: " in refused(shell, "track", spoilt)
 
 
 def test_an_unknown_reference(shell, spoilt):

@@ -11,6 +11,8 @@ import sys
 import pytest
 
 from shadowpuppet.cli import app as cli
+from shadowpuppet.cli import entry
+from shadowpuppet.errors import BROKEN
 
 INTERRUPTING = """
 import os, signal, sys
@@ -43,6 +45,24 @@ def test_a_library_that_cannot_be_loaded_is_said_in_a_line():
     assert done.returncode == 1
     assert done.stderr.startswith("error: a library cannot be loaded (import of pydantic halted")
     assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("name", "ours"), [("shadowpuppet.no_such", True), ("numpy", False), (None, False)])
+@pytest.mark.parametrize("loaded_late", [False, True])
+def test_a_module_of_ours_that_is_missing_is_a_bug_and_another_one_is_said(monkeypatch, capsys, name, ours, loaded_late):
+    def fails(*_: object) -> int:
+        cause = ImportError("no such\nmodule", name=name)
+        if loaded_late:
+            raise ImportError("a command cannot be loaded", name="shadowpuppet.cli") from cause
+        raise cause
+
+    monkeypatch.setattr("shadowpuppet.cli.app.run", fails)
+    if ours:
+        with pytest.raises(ImportError):
+            entry._run()
+    else:
+        assert entry._run() == BROKEN
+        assert capsys.readouterr().err.startswith("error: a library cannot be loaded (no such module); `python -m pip")
 
 
 def test_doctor_runs_where_a_library_cannot_be_loaded():

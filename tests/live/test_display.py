@@ -24,7 +24,6 @@ from shadowpuppet.live.display.choice import open_display
 from shadowpuppet.live.display.drawing import drawn
 from shadowpuppet.live.display.view import Angle, Display, View
 from shadowpuppet.live.display.web import PORT, WebDisplay
-from shadowpuppet.network import is_loopback, known_host
 from shadowpuppet.video import read_image
 
 ROOM = np.full((120, 160, 3), 90, np.uint8)
@@ -197,26 +196,6 @@ def test_two_hosts_are_refused(page):
         raw.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nHost: evil.example\r\n\r\n")
         raw.settimeout(5)
         assert raw.recv(100).split(b"\r\n")[0].split()[1] == b"421"
-
-
-@pytest.mark.parametrize(("host", "loopback", "good"), [
-    ("127.0.0.1:8600", True, True), ("localhost:8600", True, True), ("LOCALHOST", True, True), ("[::1]:8600", True, True),
-    ("192.168.1.5:8600", True, False), ("192.168.1.5:8600", False, True), ("evil.example", False, False), ("", True, False),
-    ("localhost.evil.example", True, False), ("127.0.0.1.evil.example", False, False), ("[::1", True, False),
-])  # fmt: skip
-def test_hosts_that_are_known(host, loopback, good):
-    assert known_host(host, loopback) == good
-
-
-def test_this_machine_s_name_is_known_where_others_may_look():
-    assert known_host(f"{socket.gethostname()}:80", loopback=False)
-    assert known_host(socket.gethostname(), loopback=True) == (socket.gethostname().lower() == "localhost")
-
-
-@pytest.mark.parametrize(("address", "alone"), [("127.0.0.1", True), ("::1", True), ("localhost", True), ("0.0.0.0", False), ("::", False),
-                                                ("192.168.0.2", False), ("my.host", False)])
-def test_what_only_this_machine_reaches(address, alone):
-    assert is_loopback(address) == alone
 
 
 def test_the_page_listens_to_this_machine_alone_by_default(page):

@@ -40,7 +40,6 @@ from shadowpuppet.live.stream.settings import OutletSettings
 from shadowpuppet.live.stream.vmc import VmcOutlet, bundles, messages
 from shadowpuppet.live.stream.websocket import WebSocketOutlet
 from shadowpuppet.motion.motion import MotionFrame
-from shadowpuppet.network import host_and_port
 
 JOINTS = {"Hips": "pelvis", "Neck": "neck", "Head": "head"}
 for _Side, _side in (("Left", "left"), ("Right", "right")):
@@ -493,12 +492,6 @@ def test_what_cannot_be_is_said(asked, said):
     with pytest.raises(SettingsError) as error:
         open_outlets(OutletSettings(**asked))
     assert said in str(error.value)
-
-
-@pytest.mark.parametrize(("text", "found"), [("39539", ("127.0.0.1", 39539)), ("studio:1", ("studio", 1)), ("[::1]:7", ("::1", 7)),
-                                             ("0.0.0.0:80", ("0.0.0.0", 80))])
-def test_a_host_is_this_machine_unless_one_is_given(text, found):
-    assert host_and_port(text, "osc") == found
 
 
 @pytest.mark.parametrize(("name", "asked"), [("websockets", {"websocket": "0"}), ("pylsl", {"lsl": "puppet"})])

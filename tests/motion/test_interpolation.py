@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.motion.interpolation import uniform_sampling
+from shadowpuppet.motion.interpolation import filled, true_runs, uniform_sampling
 
 
 @pytest.mark.parametrize("rate", [23.976, 25, 29.97, 60, 119.88, 1000])
@@ -42,3 +46,26 @@ def test_one_frame_and_none():
 def test_far_too_long_a_gap_is_said():
     with pytest.raises(ShadowPuppetError, match=r"in steps of 0\.01 s"):
         uniform_sampling([0, 0.01, 0.02, 1e7])
+
+
+@given(st.lists(st.booleans()))
+def test_runs_are_all_that_is_true_and_each_ends_where_it_is_not(known):
+    runs = true_runs(known)
+    assert [n for start, end in runs for n in range(start, end)] == [n for n, each in enumerate(known) if each]
+    assert all(end < start for (_, end), (start, _) in pairwise(runs))
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=12).filter(any), st.integers(0, 99))
+def test_unknown_values_are_filled_along_straight_lines_and_at_the_ends_with_the_nearest(known, seed):
+    rng = np.random.default_rng(seed)
+    times, slope = np.cumsum(rng.uniform(0.01, 1, len(known))), rng.normal(size=(2, 3))
+    line = 5 + times[:, None, None] * slope
+    values = np.where(np.array(known)[:, None, None], line, np.nan)
+    values[:, 0, 0] = np.nan
+    before = values.copy()
+    found = filled(times, values)
+    first, last = np.flatnonzero(known)[[0, -1]]
+    expected = 5 + np.clip(times, times[first], times[last])[:, None, None] * slope
+    expected[:, 0, 0] = np.nan  # never known
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    np.testing.assert_array_equal(values, before)

@@ -69,11 +69,6 @@ def test_a_look_is_plain(look):
     assert json.loads(json_text(look))["quality"]["border"]["bottom"] == 1.0
 
 
-def test_the_same_look_comes_before_a_run(recording, look, tmp_path):
-    run = track_recording(recording, tmp_path / "run", make_options())
-    assert json_text(run.look) == json_text(look)
-
-
 def test_without_ready_masks_nothing_is_said_of_them(recording, tmp_path):
     bare = made.copied(recording, tmp_path / "bare", without=["masks"])
     assert look_at(bare).exact_overlap is None
@@ -228,38 +223,7 @@ def test_uneven_times_are_said(recording, tmp_path):
     assert any("the time from frame to frame varies by" in doubt for doubt in look.doubts)
 
 
-def test_a_person_partly_outside_the_picture_is_tracked_with_a_doubt(recording, tmp_path):
-    aside = made.copied(recording, tmp_path / "aside", without=["references"])
-    masks = made.images(recording / "masks" / "cam.mkv")
-    shifted = [np.pad(mask[:, 40:], [(0, 0), (0, 40), (0, 0)][: mask.ndim]) for mask in masks]
-    made.write_film(aside / "masks" / "cam.mkv", shifted, lossless=True)
-    run = track_recording(aside, tmp_path / "run", make_options({"masks": True, "distance": 2, "initialization": QUICK}))
-    assert any(doubt.startswith("the silhouette touches the left border in") for doubt in run.look.doubts)
-    assert len(run.motion) == made.FRAMES
-    assert np.isfinite(run.motion.joints[run.motion.status == "tracked"]).all()
-
-
 # Refusals
-
-
-def test_empty_silhouettes_are_refused(recording, tmp_path):
-    empty = made.copied(recording, tmp_path / "empty")
-    made.write_film(empty / "video" / "cam.mp4", [*made.images(recording / "background" / "cam.mp4")] * 4)
-    look = look_at(empty)
-    assert look.refusal.startswith("the silhouette is empty in")
-    assert look.person is None
-    with pytest.raises(TrackingError, match=r"empty: the silhouette is empty in \d+ % of the frames: nobody is in the picture"):
-        track_recording(empty, tmp_path / "run")
-    assert not (tmp_path / "run").exists()
-
-
-def test_silhouettes_of_everything_are_refused(recording, tmp_path):
-    full = made.copied(recording, tmp_path / "full")
-    white = np.full(made.SIZE[::-1], 255, np.uint8)
-    made.write_film(full / "masks" / "cam.mkv", [white] * made.FRAMES, lossless=True)
-    with pytest.raises(TrackingError, match=r"full: nearly all of the picture is silhouette in 100 % of the frames: the light changed"):
-        track_recording(full, tmp_path / "run", Options(masks=True))
-    assert not (tmp_path / "run").exists()
 
 
 def test_a_film_in_another_light_than_its_background_is_refused(recording, tmp_path):

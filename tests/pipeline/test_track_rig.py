@@ -17,7 +17,6 @@ from shadowpuppet.io.motion.table import read_raw
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.limbs import LIMBS
 from shadowpuppet.pipeline.options import Options, make_options
-from shadowpuppet.pipeline.overlay_video import TALLEST, WIDEST, grid_of
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.pipeline.progress import STAGES, Listener
 from shadowpuppet.pipeline.rig import open_rig, read_frames
@@ -90,22 +89,6 @@ def test_an_overlay_is_a_grid_of_the_cameras(whole):
     assert frames[0].shape == (2 * made_rig.SIZE[1], 2 * made_rig.SIZE[0], 3)
     film = made.images(whole.folder.parent / "run" / "overlay.mp4")[5]
     assert film.std() > 10
-
-
-@pytest.mark.parametrize("sizes", [[(640, 480)] * 7, [(1080, 1920)] * 4, [(640, 480)] * 2, [(320, 240), (640, 360), (480, 640)]])
-def test_a_grid_holds_all_cameras_and_is_of_a_reasonable_size(sizes):
-    columns, rows, (width, height) = grid_of(sizes)
-    assert columns * rows >= len(sizes) > columns * (rows - 1)
-    assert columns * width <= WIDEST + 2 * columns
-    assert rows * height <= TALLEST + 2 * rows
-    assert width % 2 == height % 2 == 0
-
-
-def test_the_same_seed_is_the_same_run(recording, tmp_path):
-    folders = [track(recording, tmp_path / str(n), make_options({"masks": True, "seed": seed})).folder for n, seed in enumerate((3, 3, 4))]
-    joints = [(folder / "joints.csv").read_bytes() for folder in folders]
-    assert joints[0] == joints[1]
-    assert joints[0] != joints[2]
 
 
 def test_of_so_many_sets_one_is_tracked(recording, tmp_path):

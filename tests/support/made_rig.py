@@ -12,6 +12,7 @@ from solids import Ellipsoid, ring, seen_by
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.video import write_frames
 
@@ -51,6 +52,17 @@ def person(n: int) -> list[Ellipsoid]:
 def masks(made: Sequence[Camera], frames: int = FRAMES, first: int = 0) -> list[list[Mask]]:
     """Exact silhouettes by frame and camera."""
     return [[seen_by(camera, person(first + n)) for camera in made] for n in range(frames)]
+
+
+def shifted(seen: Sequence[Sequence[Mask]], late: Sequence[int], frames: int = 50) -> list[list[Mask]]:
+    """Silhouettes as cameras see them whose films are late by so many frames, at most ten."""
+    return [[seen[10 + f - steps][k] for k, steps in enumerate(late)] for f in range(frames)]
+
+
+def moved(camera: Camera, right: float = 0.0, down: float = 0.0, clockwise: float = 0.0) -> Camera:
+    """The calibration of a camera that was turned since by so many degrees."""
+    vector = -np.radians([down, -right, -clockwise])
+    return replace(camera, T_camera_world=rigid(rotation_from_vector(vector), np.zeros(3)) @ camera.T_camera_world)
 
 
 def write(folder: Path, made: Sequence[Camera] | None = None, seen: Sequence[Sequence[Mask]] | None = None) -> Path:

@@ -55,7 +55,9 @@ class FrameWriter:
         self.crf = crf
         self.path, self.partial = path, path.with_name(f"{path.stem}.part{path.suffix}")
         self.rate, self.size, self.lossless = Fraction(rate).limit_denominator(1001), size, lossless
-        self.count, self._stamp, self._base = 0, -1, 1 / self.rate
+        self.count, self._stamp = 0, -1
+        self._base: Fraction
+        """Seconds of a unit of `_stamp`; set by the first picture."""
         self._shape: tuple[int, ...] = ()
         self._container: Any = None
         self._stream: Any = None

@@ -73,6 +73,13 @@ def test_a_rotation_may_be_a_matrix(tmp_path):
     np.testing.assert_allclose(as_matrix[0].T_camera_world, as_vector[0].T_camera_world, atol=1e-12)
 
 
+def test_a_rotation_is_at_most_a_full_turn(tmp_path):
+    whole = read(tmp_path, section(rotation=f"[0.0, {2 * math.pi}, 0.0]"))[0]
+    np.testing.assert_allclose(whole.T_camera_world[:3, :3], np.eye(3), atol=1e-12)
+    with pytest.raises(CalibrationError, match=r"rotation: found a vector of length 6\.29, expected radians, at most a full turn"):
+        read(tmp_path, section(rotation="[0.0, 6.29, 0.0]"))
+
+
 @pytest.mark.parametrize("field", ["size", "matrix", "distortions", "rotation", "translation"])
 def test_a_missing_field_is_said(tmp_path, field):
     with pytest.raises(CalibrationError, match=rf"calibration.toml: \[cam1\]: {field}: missing, expected size, matrix"):

@@ -212,7 +212,7 @@ def test_cameras_in_the_first_one_s_world_are_stood_up(tmp_path, made):
     np.testing.assert_allclose(heights, [camera.centre[2] - made[0].centre[2] for camera in made], atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["out.toml", "folder", "folder/intri.yml"])
+@pytest.mark.parametrize("name", ["out.toml", "folder", "folder/intri.yml", "of/folders/that/are/new"])
 def test_what_is_written_is_read(tmp_path, made, name):
     (tmp_path / "folder").mkdir()
     write_calibration(tmp_path / name, made)

@@ -153,6 +153,20 @@ def test_a_file_that_is_not_there(tmp_path):
 # Tasks
 
 
+@given(st.sets(st.lists(st.sampled_from("ab"), min_size=1, max_size=4).map(tuple), min_size=1, max_size=5))
+def test_recordings_have_as_many_folders_in_their_names_as_tell_them_apart(places):
+    names = [task.name for task in make_tasks([Path("/", *place) for place in places], [Case("", {}, {})], [0])]
+    depth = 1 + max(name.count("-") for name in names)
+    assert names == ["-".join(place[-depth:]) for place in places]
+    assert len(set(names)) == len(places)
+    assert depth == 1 or len({place[1 - depth:] for place in places}) < len(places)
+
+
+def test_recordings_that_no_number_of_folders_tells_apart_are_numbered():
+    names = [task.name for task in make_tasks(["/a/b-c", "/a-b/c", "/d/c"], [Case("", {}, {})], [0])]
+    assert names == ["a-b-c-0", "a-b-c-1", "d-c-2"]
+
+
 def ids(recording: Path, values: dict | None = None, seeds=(0,)) -> list[str]:
     return [task.id for task in make_tasks([recording], make_grid(values).cases, seeds)]
 

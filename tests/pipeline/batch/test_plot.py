@@ -50,6 +50,7 @@ def test_a_point_a_run_with_median_and_quartiles(drawn):
     np.testing.assert_array_equal(one.get_xdata(), [20.0])
     assert [label.get_text() for label in errors.get_yticklabels()] == ["drs", "srs\n1 of 2"]
     assert errors.get_ylim() == (1.6, -0.6)
+    assert [side for axes in figure.axes for side, line in axes.spines.items() if line.get_visible()] == ["bottom", "bottom"]
     assert figure.get_suptitle() == "5 of 6 runs of lab; a point each, line: median, bar: quartiles"
 
 

@@ -16,7 +16,7 @@ from shadowpuppet.io.calibration.calibration_files import read_calibration, writ
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.repair.check import SilhouetteSets, judge_calibration
 from shadowpuppet.pipeline.repair.films import Checked
-from shadowpuppet.pipeline.repair.fix import _write_notes, fix_recording
+from shadowpuppet.pipeline.repair.fix import fix_recording, write_notes
 from shadowpuppet.pipeline.rig import open_rig
 
 
@@ -68,6 +68,6 @@ def test_nothing_is_changed_in_a_good_recording_or_of_a_still_person(copy, masks
 def test_other_notes_stay_and_those_on_another_calibration_go(tmp_path):
     path = tmp_path / "recording.toml"
     path.write_text('unit = "mm"\ncalibration = "old.yml"\nrate = 30\n[start]\na = 1.0\nb = 2.0\n')
-    assert _write_notes(path, {"start": {"a": 0.5}, "calibration": None}) == [path, tmp_path / "recording.before1.toml"]
+    assert write_notes(path, {"start": {"a": 0.5}, "calibration": None}) == [path, tmp_path / "recording.before1.toml"]
     assert tomllib.loads(path.read_text()) == {"rate": 30, "start": {"a": 0.5}}
-    assert _write_notes(path, {"start": {"a": 0.5}}) == []
+    assert write_notes(path, {"start": {"a": 0.5}}) == []

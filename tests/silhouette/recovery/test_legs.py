@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shadowpuppet.silhouette.recovery.legs import still_legs
+from shadowpuppet.silhouette.recovery.legs import _zone, still_legs, waist
 from shadowpuppet.silhouette.recovery.movement import Movement
 
 SIZE = 120, 160
@@ -28,6 +28,24 @@ def test_legs_that_keep_still_are_found_below_the_trunk():
     assert found[62:99, 84:94].all()
     assert not found[70:, 78:82].any()
     assert not found[102:].any()
+
+
+@pytest.mark.parametrize("wider", [0, 1, -1])
+def test_a_trunk_is_measured_at_its_centre_and_a_twentieth_of_its_rows_above(wider):
+    trunk = np.zeros(SIZE, bool)
+    for n in range(40):
+        half = 30 + wider * (n - 20) // 2
+        trunk[10 + n, 80 - half : 80 + half] = True
+    middle, across = waist(trunk)
+    rows, _ = np.nonzero(trunk)
+    assert middle == int(rows.mean())
+    np.testing.assert_array_equal(across, trunk[middle if wider > 0 else middle - 2])
+
+
+def test_legs_are_looked_for_below_the_centre_and_half_as_wide_as_the_trunk_on_either_side():
+    zone, (_, _, covered) = np.zeros(SIZE, bool), standing()
+    zone[41:, 64 - 16 : 96 + 16] = True
+    np.testing.assert_array_equal(_zone(covered), zone)
 
 
 @pytest.mark.parametrize("what", ["nothing covered", "a floor without legs", "trousers of the wall's colour", "not connected", "far aside"])

@@ -31,8 +31,8 @@ FAR_PIXELS = 5.0
 """Distance of tangents, pixels of a picture 1000 wide, that is not an outline's noise."""
 LEAST_TANGENTS = 30
 """Least number of tangents per camera."""
-STEPS = 40
-"""Greatest number of steps with each loss."""
+STEPS, LEAST_GAIN = 40, 1e-6
+"""Greatest number of steps with each loss, and the relative decrease that ends them."""
 NUDGE = 1e-5
 """Difference of the numeric derivatives, rad and m."""
 BLOCKS = 20
@@ -110,17 +110,18 @@ def _check(cameras: Sequence[Camera], pairs: Sequence[_Pair], found: Sequence[Ar
                                    f"{LEAST_TANGENTS}: the person must be whole in the picture more often")
 
 
-def _hulls(camera: Camera, silhouettes: Sequence) -> _Hulls:
+def _hulls(camera: Camera, silhouettes: Row) -> _Hulls:
+    """The hulls of one camera's silhouettes."""
     import cv2
 
-    corners = []
+    corners = list[tuple[Array, NDArray[np.bool_]]]()
     for each in silhouettes:
         if each is None:
-            corners.append((np.tile([[0.0, 0.0, 1.0]], (1, 1)), np.zeros(1, bool)))
+            corners.append((np.array([[0.0, 0.0, 1.0]]), np.zeros(1, bool)))
             continue
         pixels, firm = each.contour
         rays = camera.rays(pixels)
-        hull = cv2.convexHull(rays[:, :2].astype(np.float32), returnPoints=False).ravel()
+        hull = np.asarray(cv2.convexHull(rays[:, :2].astype(np.float32), returnPoints=False), np.int64).ravel()
         corners.append((rays[hull] / np.linalg.norm(rays[hull], axis=1, keepdims=True), firm[hull]))
     most = max((len(rays) for rays, _ in corners), default=1)
     pad = [(np.concatenate([rays, np.repeat(rays[-1:], most - len(rays), 0)]), np.r_[firm, np.repeat(firm[-1:], most - len(firm))])
@@ -164,7 +165,7 @@ def _minimised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequen
     for _ in range(STEPS):
         H, g = _normal(_linearised(cameras, hulls, pairs, value, found), value.size, scale)
         H, g = H[np.ix_(places, places)] + np.diag(prior), g[places] + prior * value.ravel()[places]
-        better = False
+        gain = 0.0
         for _ in range(8):
             step = np.linalg.solve(H + damping * np.diag(np.diag(H)), -g)
             tried = value.copy()
@@ -172,11 +173,11 @@ def _minimised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequen
             new = [_distances(_moved(cameras, tried), hulls, pair) for pair in pairs]
             least = _loss(new, scale) + float((prior * tried.ravel()[places] ** 2).sum()) / 2
             if least < cost:
-                gain, better = (cost - least) / cost, True
+                gain = (cost - least) / cost
                 value, found, cost, damping = tried, new, least, max(damping / 10, 1e-9)
                 break
             damping *= 10
-        if not better or gain < 1e-6:
+        if gain < LEAST_GAIN:
             break
     return value
 
@@ -254,9 +255,9 @@ def _whole_rig(cameras: Sequence[Camera]) -> Array:
     """Increments (6 C, 7) of all cameras by which the rig turns, moves and grows as a whole."""
     columns = []
     for axis in np.eye(3):
-        columns.append([np.r_[camera.T_camera_world[:3, :3] @ axis, np.zeros(3)] for camera in cameras])
-        columns[-1] = [each + np.r_[np.zeros(3), -np.cross(each[:3], camera.T_camera_world[:3, 3])] for each, camera in zip(columns[-1], cameras)]
-        columns.append([np.r_[np.zeros(3), camera.T_camera_world[:3, :3] @ axis] for camera in cameras])
+        along = [camera.T_camera_world[:3, :3] @ axis for camera in cameras]
+        columns.append([np.r_[turn, -np.cross(turn, camera.T_camera_world[:3, 3])] for turn, camera in zip(along, cameras)])
+        columns.append([np.r_[np.zeros(3), move] for move in along])
     columns.append([np.r_[np.zeros(3), camera.T_camera_world[:3, 3]] for camera in cameras])
     return np.array([np.concatenate(each) for each in columns]).T
 

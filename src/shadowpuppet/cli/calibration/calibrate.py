@@ -1,8 +1,8 @@
-"""The command `calibrate`: lenses and places of cameras from films of a board."""
+"""The command `calibrate`: lenses and places of cameras from films of a board, or places from those of a person."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,10 +13,13 @@ from rich.console import Group, RenderableType
 from shadowpuppet.cli.flags import OTHER, Switch, flag, output
 from shadowpuppet.cli.tables import pairs, show, table
 from shadowpuppet.errors import CalibrationError
+from shadowpuppet.geometry import vector_from_rotation
 
 if TYPE_CHECKING:
     from shadowpuppet.calibration.boards.board import Board
     from shadowpuppet.calibration.session import Calibrated
+    from shadowpuppet.camera.camera import Camera
+    from shadowpuppet.pipeline.repair.placing import Placed
 
 
 def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml and films of a board: intrinsics/CAMERA.mp4, "
@@ -27,13 +30,17 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
               lenses: Annotated[Path | None, flag("A calibration whose lenses are kept; only places are solved.")] = None,
               to: Annotated[Path | None, output("Calibration to write; LAB/calibration.toml if not given. An old one is kept "
                                                 "as calibration.before1.toml.")] = None,
+              from_person: Annotated[Switch, Parameter(help="LAB is a recording of a person who walks, with a rough calibration: "
+                                                            "refine places by outlines, scale by the height, floor by the feet.")] = False,
+              height: Annotated[float | None, flag("With --from-person: the person's height in metres, with shoes on.")] = None,
+              masks: Annotated[Switch, Parameter(help="With --from-person: use the recording's masks/.")] = False,
               print_board: Annotated[Path | None, flag("Write the board as a PDF of true size, and end.")] = None,
               no_report: Annotated[Switch, Parameter(group=OTHER, help="Write no calibration.html.")] = False) -> int:
     """Calibrate the cameras of a lab from films of a board: lenses from a board shown to each camera, places from one carried through the
     room before several, the floor from one that lies on it.
 
     Writes LAB/calibration.toml, and LAB/calibration.html with errors, coverage, places, and what to film again. Exit code 1 if something
-    should be filmed again.
+    should be filmed again. With --from-person no board is needed: lenses are those of the rough calibration.
     """
     if print_board is not None:
         from shadowpuppet.calibration.boards.printing import write_board
@@ -44,6 +51,8 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
         return 0
     if lab is None:
         raise CalibrationError("expected a folder with films of a board; or --print-board board.pdf --board 'charuco 7x5' --square 0.04")
+    if from_person:
+        return _from_person(lab, height, masks, to)
     from shadowpuppet.calibration.results import write_results
     from shadowpuppet.calibration.session import calibrate as solve
     from shadowpuppet.calibration.session import open_session
@@ -73,6 +82,37 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
         for sentence in found.advice:
             listener.warn(sentence)
     return 1 if found.advice else 0
+
+
+def _from_person(recording: Path, height: float | None, masks: bool, to: Path | None) -> int:
+    from shadowpuppet.cli.terminal import terminal
+    from shadowpuppet.pipeline.options import make_options
+    from shadowpuppet.pipeline.repair.placing import place_cameras, write_placed
+    from shadowpuppet.pipeline.rig import open_rig
+
+    with terminal() as listener:
+        rig = open_rig(recording, make_options({"height": height, "masks": masks}))
+        placed = place_cameras(rig, make_options({"height": height, "masks": masks}), listener)
+        written = write_placed(rig, placed, to)
+        listener.stop()
+        show(placed_table(placed, rig.cameras), pairs([("written", "\n".join(map(str, written)))]))
+        for sentence in placed.advice:
+            listener.warn(sentence)
+    return 1 if placed.advice else 0
+
+
+def placed_table(placed: Placed, before: Sequence[Camera]) -> RenderableType:
+    """A row a camera: how far its tangents were and are from the others', how it was moved, and how well it is known."""
+    rows = []
+    for n, (camera, old) in enumerate(zip(placed.cameras, before)):
+        turned = np.degrees(np.linalg.norm(vector_from_rotation(camera.T_camera_world[:3, :3] @ old.T_camera_world[:3, :3].T)))
+        rows.append((camera.name, f"{placed.fit.before[n]:.1f} px", f"{placed.fit.after[n]:.1f} px",
+                     f"{1000 * np.linalg.norm(camera.centre - old.centre):.0f} mm", f"{turned:.1f}°",
+                     f"{1000 * placed.place_doubt[n]:.0f} mm, {np.degrees(placed.angle_doubt[n]):.2f}°"))
+    what = (f"{placed.sets} sets of silhouettes, {placed.fit.tangents} pairs of tangents; lengths times {placed.scale:.3f}, floor "
+            f"tilted by {np.degrees(placed.tilt):.1f}°")
+    columns = ("camera", "apart", "now", "moved", "turned", "within the rig to")
+    return Group(pairs([("compared", what)]), "", table("", columns, rows, right=(1, 2, 3, 4)))
 
 
 def _board(lab: Path | None, board: str | None, square: float | None, dictionary: str | None) -> Board:

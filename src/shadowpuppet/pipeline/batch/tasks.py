@@ -184,12 +184,13 @@ def _elsewhere(folder: Path) -> Iterator[Path]:
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
-    """Short unique names of recordings, with as many parent folders as that needs."""
-    for depth in range(1, max(len(path.parts) for path in paths) + 1):
-        names = ["-".join(path.parts[-depth:]) for path in paths]
+    """Short unique names of recordings at absolute paths, with as many parent folders as that needs."""
+    inside = [path.parts[1:] for path in paths]
+    for depth in range(1, max(map(len, inside)) + 1):
+        names = ["-".join(parts[-depth:]) for parts in inside]
         if len(set(names)) == len(names):
             return names
-    return ["-".join([*path.parts, str(n)]) for n, path in enumerate(paths)]  # such as a-b/c and a/b-c
+    return ["-".join([*parts, str(n)]) for n, parts in enumerate(inside)]  # such as a-b/c and a/b-c
 
 
 def _found(settings: Mapping[str, Any], name: str) -> Any:

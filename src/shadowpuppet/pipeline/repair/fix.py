@@ -58,7 +58,7 @@ def fix_recording(rig: Rig, checked: Checked) -> Fix:
         files += [path, *([kept] if kept is not None else [])]
         done += [f"calibration.toml: {name} turned back by {fix.turn.degrees:.2f} degrees" for name, fix in found.turns.items()]
         notes["calibration"] = None
-    files += _write_notes(folder / "recording.toml", notes)
+    files += write_notes(folder / "recording.toml", notes)
     return Fix(done=tuple(done), files=tuple(map(str, files)), pixels=pixels)
 
 
@@ -71,7 +71,7 @@ def _shifts(rig: Rig, checked: Checked) -> list[float]:
             for name in rig.names]
 
 
-def _write_notes(path: Path, changes: Mapping[str, Any]) -> list[Path]:
+def write_notes(path: Path, changes: Mapping[str, Any]) -> list[Path]:
     """Change recording.toml; returns the files written. `calibration`: the recording's own calibration.toml counts from now on, which is in
     metres with z up, so that what was said of another's unit and up direction goes."""
     values = dict(read_toml(path, RecordingError)) if path.exists() else {}

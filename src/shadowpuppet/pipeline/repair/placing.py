@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from shadowpuppet.calibration.results import keep_old
 from shadowpuppet.calibration.silhouettes import Row
 from shadowpuppet.calibration.solve.tangency_bundle import TangencyFit, place_by_outlines
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, evenly_spread, inverse, rigid, rotation_from_vector, unit
+from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.repair.check import gather_silhouettes
+from shadowpuppet.pipeline.repair.fix import write_notes
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 
 SETS = 90
 """Number of sets, over all of the films, whose outlines are compared."""
+MAX_CROUCH = 1.03
+"""Ratio of that height to the median from which on the person is not upright enough for a scale."""
 STANDING = 80
 """Percentile of the heights of the visual hull that counts as the person's: walking and bending people are lower."""
 EXTREMES = 4
@@ -31,8 +37,8 @@ LEAST_POINTS, LEAST_HULLS = 50, 10
 """Least number of points of a hull, and of hulls, whose ends are used."""
 DOUBT_FACTOR = 3.0
 """Factor on the fit's standard deviations: silhouettes err alike in all of a film, which it does not know."""
-MAX_PLACE_SD, MAX_ANGLE_SD = 0.02, np.radians(0.5)
-"""Standard deviations of a camera's place, metres, and direction, rad, that are not remarked on, times `DOUBT_FACTOR`."""
+MAX_PLACE_DOUBT, MAX_ANGLE_DOUBT = 0.02, np.radians(0.3)
+"""Doubts about a camera's place, metres, and direction, rad, that are not remarked on."""
 MANY_FAR = 0.15
 """Share of tangents that are far apart (`TangencyFit.far`) that is remarked on."""
 
@@ -54,6 +60,16 @@ class Placed:
     advice: tuple[str, ...]
     """What to doubt, a sentence each; none if all is well."""
 
+    @property
+    def place_doubt(self) -> Array:
+        """What each camera's place is known to within the rig, of shape (C,), metres."""
+        return DOUBT_FACTOR * self.scale * self.fit.place_sd
+
+    @property
+    def angle_doubt(self) -> Array:
+        """The same of its direction, of shape (C,), rad."""
+        return DOUBT_FACTOR * self.fit.angle_sd
+
 
 def place_cameras(rig: Rig, options: Options, listener: Listener | None = None) -> Placed:
     """The places and directions of cameras with known lenses and rough places, from the person in their films.
@@ -72,16 +88,19 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None) 
     listener.begin("floor and height")
     ends = _ends(fit.cameras, rows)
     height = options.height or rig.recording.subject.height
-    scale = 1.0
-    if ends is not None:
-        level, tilt = _floor(ends)
-        tall = float(np.percentile(_above(level, ends.top), STANDING))
-        scale = height / tall if height is not None else 1.0
-        cameras = tuple(_seen_from(camera, level, scale) for camera in fit.cameras)
-    else:
-        cameras, tilt = fit.cameras, 0.0
-    return Placed(cameras=cameras, fit=fit, sets=len(rows), scale=scale, tilt=tilt,
-                  advice=tuple(_advice(fit, scale, ends is None, height is None)))
+    advice = list(_doubts(fit))
+    if ends is None:
+        advice.append("floor and scale are the rough calibration's: the person is hardly ever whole in two pictures")
+        return Placed(cameras=fit.cameras, fit=fit, sets=len(rows), scale=1.0, tilt=0.0, advice=tuple(advice))
+    level, tilt = _floor(ends)
+    usual, tall = np.percentile(_above(level, ends.top), [50, STANDING])
+    if height is None:
+        advice.append("the scale is the rough calibration's: state the person's --height, in metres with shoes on")
+    elif tall > MAX_CROUCH * usual:
+        advice.append(f"the scale is rough: the person bends in most of the film ({usual:.2f} m high, {tall:.2f} when upright)")
+    scale = 1.0 if height is None else height / float(tall)
+    return Placed(cameras=tuple(_seen_from(camera, level, scale) for camera in fit.cameras), fit=fit, sets=len(rows), scale=scale,
+                  tilt=tilt, advice=tuple(advice))
 
 
 class _Ends(NamedTuple):
@@ -125,9 +144,8 @@ def _floor(ends: _Ends) -> tuple[Array, float]:
     axis = np.cross(up, [0.0, 0.0, 1.0])
     sine, angle = float(np.linalg.norm(axis)), float(np.arccos(np.clip(up[2], -1, 1)))
     R = rotation_from_vector(axis / sine * angle) if sine > 1e-9 else np.eye(3)
-    ground = middle + [0.0, 0.0, plane[2]]
-    keep = np.array([ground[0], ground[1], 0.0])
-    return rigid(R, keep - R @ ground), angle
+    ground = middle + plane[2] * np.array([0.0, 0.0, 1.0])
+    return rigid(R, ground * [1, 1, 0] - R @ ground), angle
 
 
 def _above(level: Array, places: Array) -> Array:
@@ -142,17 +160,28 @@ def _seen_from(camera: Camera, level: Array, scale: float) -> Camera:
     return replace(camera, T_camera_world=T)
 
 
-def _advice(fit: TangencyFit, scale: float, no_floor: bool, no_height: bool) -> list[str]:
-    said = []
+def _doubts(fit: TangencyFit) -> Iterator[str]:
+    """What to doubt about the fit, a sentence each."""
     if fit.far > MANY_FAR:
-        said.append(f"{100 * fit.far:.0f} % of the tangents do not fit: are the films in step (`shadowpuppet check`), and are silhouettes "
-                    "whole? a leg that is missing in one camera moves all others")
-    for camera, place, angle in zip(fit.cameras, DOUBT_FACTOR * scale * fit.place_sd, DOUBT_FACTOR * fit.angle_sd):
-        if place > MAX_PLACE_SD or angle > MAX_ANGLE_SD:
-            said.append(f"camera {camera.name!r} is known to {1000 * place:.0f} mm and {np.degrees(angle):.1f} degrees only: film a person "
-                        "who walks through all of the room, bends and reaches")
-    if no_floor:
-        said.append("the floor is not known: the person is hardly ever whole in two pictures")
-    if no_height:
-        said.append("the scale is the rough calibration's: state the person's --height, in metres with shoes on")
-    return said
+        yield (f"{100 * fit.far:.0f} % of the tangents do not fit: are the films in step (`shadowpuppet check`), and are silhouettes "
+               "whole? A leg that is missing in one camera moves all others")
+    poor = [f"{camera.name} to {1000 * place:.0f} mm and {np.degrees(angle):.1f} degrees"
+            for camera, place, angle in zip(fit.cameras, DOUBT_FACTOR * fit.place_sd, DOUBT_FACTOR * fit.angle_sd)
+            if place > MAX_PLACE_DOUBT or angle > MAX_ANGLE_DOUBT]
+    if poor:
+        yield f"places are not well known ({', '.join(poor)}): film a person who walks through all of the room, bends and reaches"
+
+
+def write_placed(rig: Rig, placed: Placed, path: Path | None = None) -> list[Path]:
+    """Write the calibration (.toml), by default the recording's own; returns the files written. One that is there is kept under another
+    name. Cameras that were not placed stay as they are. Raises `CalibrationError` or `RecordingError` if a file cannot be written."""
+    path = path or rig.recording.path / "calibration.toml"
+    own = path == rig.recording.path / "calibration.toml"
+    if not path.parent.is_dir():
+        raise CalibrationError(f"{path}: its folder does not exist")
+    kept = keep_old(path)
+    places = {camera.name: camera.T_camera_world for camera in placed.cameras}
+    write_calibration(path, [replace(view.camera, T_camera_world=places.get(view.camera.name, view.camera.T_camera_world))
+                             for view in rig.recording.views])
+    notes = write_notes(rig.recording.path / "recording.toml", {"calibration": None}) if own else []
+    return [path, *([kept] if kept is not None else []), *notes]

@@ -59,11 +59,17 @@ def largest_part(covered: Mask) -> Mask | None:
     return np.asarray(parts) == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
 
 
-def _zone(trunk: Mask) -> NDArray[np.bool_]:
-    """The pixels (H, W) below the middle of the trunk (H, W), and somewhat beside it."""
+def waist(trunk: Mask) -> tuple[int, NDArray[np.bool_]]:
+    """The row of a trunk's (H, W) centre, and the columns (W,) that it covers there or just above."""
     rows = trunk.sum(axis=1)
     middle = int(np.average(np.arange(len(rows)), weights=rows))
-    columns = np.flatnonzero(trunk[middle - np.count_nonzero(rows) // WAIST : middle + 1].any(axis=0))
+    return middle, np.any(trunk[middle - np.count_nonzero(rows) // WAIST : middle + 1], axis=0)
+
+
+def _zone(trunk: Mask) -> NDArray[np.bool_]:
+    """The pixels (H, W) below the middle of the trunk (H, W), and somewhat beside it."""
+    middle, across = waist(trunk)
+    columns = np.flatnonzero(across)
     out = np.zeros(trunk.shape, bool)
     if len(columns):
         margin = round(SPREAD * (columns[-1] - columns[0] + 1))

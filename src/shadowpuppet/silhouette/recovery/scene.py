@@ -16,7 +16,7 @@ from shadowpuppet.silhouette.recovery.colours import UNKNOWN, colour_model, know
 from shadowpuppet.silhouette.recovery.filling import filled
 from shadowpuppet.silhouette.recovery.head import missing_head
 from shadowpuppet.silhouette.recovery.labelling import NEVER, label_pixels, pair_costs
-from shadowpuppet.silhouette.recovery.legs import still_legs
+from shadowpuppet.silhouette.recovery.legs import still_legs, waist
 from shadowpuppet.silhouette.recovery.modes import COUNT, Modes, radius_of, ranked, temporal_modes
 from shadowpuppet.silhouette.recovery.movement import Mask, Movement, find_movement, unsteady
 
@@ -40,8 +40,6 @@ CALM_SHARE = 0.25
 """Least area of a part of such pixels over that of the largest."""
 PART_SHARE, PART_COLOUR = 0.02, 0.5
 """Least area of a covered part over that of the largest one, and least log ratio of its colours over the largest one's."""
-WAIST = 20
-"""Rows of the largest covered part over those, above its centre, in which its width is that of the trunk."""
 CONNECTED = 0.8
 """Least share of the frames in which another covered part is connected with the largest."""
 MEMBER = 1.2
@@ -242,10 +240,9 @@ def _below(field: _Field, labels: NDArray[np.intp] | None) -> NDArray[np.bool_]:
     if len(stats) < 2:
         return np.zeros(int(region.sum()), bool)
     largest = np.asarray(parts) == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
-    rows = largest.sum(axis=1)
-    middle = int(np.average(np.arange(len(rows)), weights=rows))
+    middle, across = waist(largest)
     below = np.zeros(region.shape, bool)
-    below[middle:] = largest[middle - np.count_nonzero(rows) // WAIST : middle + 1].any(axis=0)
+    below[middle:] = across
     return below[region]
 
 

@@ -16,7 +16,7 @@ from shadowpuppet.io.motion.opensim.markers import marker_names
 from shadowpuppet.io.motion.opensim.model_writer import write_osim
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.animation import Animation
-from shadowpuppet.motion.body_animation import motion_animation
+from shadowpuppet.motion.body_animation import BodyTree, motion_animation
 
 WHOLE = ("anatomical", "cylinders")
 
@@ -63,6 +63,22 @@ def test_the_models_markers_lie_where_the_runs_joints_do(tmp_path, name):
         for n, marker in enumerate(table.names):
             R, p = frames[known[marker].findtext("socket_parent_frame", "").split("/")[-1]]
             np.testing.assert_allclose(p + R @ numbers(known[marker].find("location")), table.positions[t, n], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_poses_within_our_limits_are_within_the_ranges_of_the_models_hinges(tmp_path, name):
+    body = runs.body_of(name)
+    lowest, highest = body.skeleton.limits
+    poses = np.array([lowest, highest]).clip(-3, 3)
+    animation = BodyTree(body).animation(np.arange(2.0), poses, np.eye(4))
+    write_osim(tmp_path / "a.osim", body, animation)
+    model = ElementTree.parse(tmp_path / "a.osim").getroot()[0]
+    ranges = {each.attrib["name"]: numbers(each.find("range")) for each in model.iter("Coordinate")}
+    assert all(low < high for low, high in ranges.values())
+    hinges = {each: values for each, values in coordinates(animation, "own").items() if each.startswith(("knee", "ankle", "elbow"))}
+    assert len(hinges) == (6 if name == "anatomical" else 4)
+    for each, values in hinges.items():
+        np.testing.assert_allclose(np.sort(values), ranges[each], atol=1e-6)
 
 
 @pytest.mark.parametrize("name", WHOLE)
