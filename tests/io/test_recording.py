@@ -11,7 +11,7 @@ import pytest
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, VideoError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.io.recording import POSTURES, Subject, read_recording
+from shadowpuppet.io.recording import POSTURES, Subject, is_recording, read_recording
 from shadowpuppet.video import write_frames, write_image
 
 SIZE = (32, 24)
@@ -261,6 +261,7 @@ def test_films_may_lie_beside_their_calibration(tmp_path):
     for name in ("a", "b"):
         film(tmp_path / "lab" / f"{name}.mp4")
     assert [view.video.name for view in read_recording(tmp_path / "lab").views] == ["a.mp4", "b.mp4"]
+    assert is_recording(tmp_path / "lab")  # which `info` looks at, not at the calibration alone
     (tmp_path / "lab" / "calibration.toml").rename(tmp_path / "lab" / "Calib_own.toml")
     assert [view.camera.name for view in read_recording(tmp_path / "lab").views] == ["a", "b"]
     film(tmp_path / "lab" / "overlay.mp4")

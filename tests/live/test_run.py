@@ -33,6 +33,7 @@ from shadowpuppet.live import run as live_run
 from shadowpuppet.live.display.view import Display
 from shadowpuppet.live.run import LiveListener, run_live
 from shadowpuppet.live.settings import LiveSettings
+from shadowpuppet.live.sources import lens
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.video import write_image
 from shadowpuppet.video.live_source import Feed, Snapshot
@@ -203,6 +204,12 @@ def test_a_calibration_for_another_size_is_refused(film, tmp_path):
 def test_what_is_assumed_is_said(film, tmp_path):
     with pytest.warns(ShadowPuppetWarning, match="65 degrees are assumed"), pytest.warns(ShadowPuppetWarning, match="give --height"):
         run_live(tmp_path / "run", make_options(QUICK), replace(SETTINGS, camera=str(film), speed=20.0))
+
+
+def test_an_upright_camera_sees_less_from_side_to_side():
+    with pytest.warns(ShadowPuppetWarning, match="39 degrees are assumed"):
+        camera = lens(make_options({}), (1080, 1920))
+    assert camera.size == (1080, 1920)
 
 
 # Stops

@@ -16,6 +16,7 @@ from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import DEEP, _doubts, _forearms_seen, wrong_posture
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes, read_masks
+from shadowpuppet.pipeline.survey.camera import _doubts as camera_doubts
 from shadowpuppet.pipeline.survey.camera import _look
 from shadowpuppet.pipeline.survey.cautions import recovery_cautions
 from shadowpuppet.pipeline.survey.film import quality_of, survey_film
@@ -30,6 +31,12 @@ QUICK = {"rounds": 20, "patience": 5, "sweeps": 2}
 @pytest.fixture(scope="module")
 def look(recording):
     return look_at(recording)
+
+
+@pytest.mark.parametrize(("size", "fov", "doubted"), [((480, 640), 65.0, True), ((480, 640), 40.0, False), ((640, 480), 65.0, False)])
+def test_the_view_of_a_phone_held_across_is_doubted_in_an_upright_film(recording, look, size, fov, doubted):
+    doubts = camera_doubts(replace(look, size=size, fov=fov, calibrated=False), open_footage(recording, Options()))
+    assert any("--fov 40" in str(doubt) for doubt in doubts) == doubted
 
 
 def test_a_look_says_what_is_there(recording, look):

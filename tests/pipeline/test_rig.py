@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +14,11 @@ from solids import looking
 
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, SilhouetteError
 from shadowpuppet.io.recording import Recording, View
-from shadowpuppet.pipeline.footage import CameraFrame, Footage, chosen_views, cut, spread_frames, take_sample
+from shadowpuppet.pipeline.footage import CameraFrame, Footage, Opening, chosen_views, cut, spread_frames, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.repair.films import check_calibration
 from shadowpuppet.pipeline.rig import LATE, Rig, open_rig, read_frames, synchronized_frames
+from shadowpuppet.pipeline.survey.opening import kept_sets
 from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.video import write_frames
 
@@ -133,7 +136,33 @@ def test_a_part_of_a_recording_keeps_its_times(tmp_path):
             np.testing.assert_array_equal(image, same)
     assert take_sample(part.footage[0]).times == pytest.approx([0.3, 0.4, 0.5, 0.6])
     assert take_sample(part.footage[0]).first[0].time == pytest.approx(0.3)
-    np.testing.assert_array_equal(spread_frames(part.footage[0])[0], take_sample(part.footage[0]).frames[0].image)
+
+
+def test_the_empty_scene_of_a_part_is_recovered_from_the_whole_film(tmp_path):
+    whole = rig(tmp_path, steady(10), suffix=".mp4")
+    part = of_recording(whole, cut(whole.recording, make_options({"start": "3f", "end": 0.7})))
+    assert [number_of(image) for image in spread_frames(part.footage[0])] == list(range(10))
+    assert [number_of(frame.image) for frame in take_sample(part.footage[0]).frames] == [3, 4, 5, 6]
+
+
+@pytest.mark.parametrize(("late", "every"), [(0.0, 1), (0.015, 3), (-0.015, 1)])
+def test_the_opening_need_not_be_read_again(tmp_path, late, every):
+    """What the samples keep of films in step are the frame sets that reading them gives."""
+    made = rig(tmp_path, steady(40), steady(38), starts=(0.0, -late), suffix=".mp4")
+    part = of_recording(made, replace(made.recording, begin=0.75))
+    opening = Opening(2.0, every, 5)
+    kept = kept_sets(part, [take_sample(footage, opening=opening) for footage in part.footage], opening)
+    read = list(islice(synchronized_frames(part, [bright] * 2, every=every), 5))
+    assert [frames[part.leaders[0]].time for frames in kept] == [each.time for each in read]
+    for frames, each in zip(kept, read, strict=True):
+        for frame, image in zip(frames, each.images, strict=True):
+            np.testing.assert_array_equal(frame.image, image)
+
+
+@pytest.mark.parametrize(("other", "late"), [(steady(20), 0.04), (steady(20, 5.0), 0.0), (steady(4), 0.0)], ids=["late", "slow", "short"])
+def test_films_out_of_step_are_read_again(tmp_path, other, late):
+    made, opening = rig(tmp_path, steady(20), other, starts=(0.0, -late), suffix=".mp4"), Opening(2.0, 1, 5)
+    assert kept_sets(made, [take_sample(footage, opening=opening) for footage in made.footage], opening) is None
 
 
 def test_a_part_outside_of_the_recording_is_refused(tmp_path):

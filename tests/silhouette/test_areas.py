@@ -59,9 +59,9 @@ def test_areas_are_only_for_a_sensors_noise():
     classifier = learn_background([room()], film=frames).classifier
     assert isinstance(classifier, ChannelClassifier)
     assert classifier.areas is None
-    assert FilmNoise(1.5, np.full(3, 2.0), np.full(3, 0.5)).grainy
-    assert not FilmNoise(1.5, np.full(3, 2.0), np.full(3, 0.9)).grainy
-    assert not FilmNoise(0.7, np.full(3, 2.0), np.full(3, 0.5)).grainy
+    assert FilmNoise(1.5, np.full(3, 2.0), np.full(3, 0.5), np.full(3, 4.0)).grainy
+    assert not FilmNoise(1.5, np.full(3, 2.0), np.full(3, 0.9), np.full(3, 2.2)).grainy
+    assert not FilmNoise(0.7, np.full(3, 2.0), np.full(3, 0.5), np.full(3, 4.0)).grainy
 
 
 def test_areas_decide_what_may_be_shadow_and_add_only_insides():

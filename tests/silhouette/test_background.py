@@ -26,6 +26,6 @@ def test_the_assumed_noise_is_the_greatest_of_what_was_learnt_what_the_film_has_
     flat, learnt = np.full((8, 8, 3), 100, np.float32), np.zeros((8, 8, 3), np.float32)
     learnt[4:] = 20.0
     background = Background(9, True, flat[..., 0].astype(float), learnt[..., 0].astype(float), flat, learnt)
-    found = assumed_sigma(background, FilmNoise(3.0, np.array([5.0, 0.1, 0.1]), np.array([0.6, 0.25, 0.5])), 2.0, flat)
+    found = assumed_sigma(background, FilmNoise(3.0, np.array([5.0, 0.1, 0.1]), np.array([0.6, 0.25, 0.5]), np.full(3, 9.0)), 2.0, flat)
     assert found[5, 4] == pytest.approx([12.0, 5.0, 10.0])  # smoothing that calms the film calms what was learnt as well
     assert found[2, 4] == pytest.approx([1.8 * 5, 0.75 * 2, 0.75 * 2])

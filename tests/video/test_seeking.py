@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -42,6 +43,21 @@ def test_any_order_gives_the_frames_of_their_times(film, order):
     times = [frame.time for frame in open_frames(film)]
     with Seeker(film, SIZE) as seeker:
         assert [number_of(seeker.at(times[n])) for n in order] == order
+
+
+def test_frames_that_are_passed_over_change_no_picture(tmp_path):
+    """Of a film with frames that refer to others before and behind them."""
+    path, shown = tmp_path / "film.mkv", np.random.default_rng(1).integers(0, 255, (SIZE[1], SIZE[0] + 60, 3)).astype(np.uint8)
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", round(RATE), options={"bf": "3", "g": "30", "crf": "30"})
+        stream.width, stream.height, stream.pix_fmt = *SIZE, "yuv420p"
+        for n in range(60):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(shown[:, n : n + SIZE[0]]), "bgr24")))
+        container.mux(stream.encode())
+    frames = list(open_frames(path))
+    with Seeker(path, SIZE) as seeker:
+        for n in (17, 18, 27, 59, 3, 41):
+            np.testing.assert_array_equal(seeker.at(frames[n].time), frames[n].image)
 
 
 def test_between_two_frames_it_is_the_nearer_and_beyond_the_ends_none(film):

@@ -15,6 +15,8 @@ MAX_DISTORTION = 1e6
 """Bound of plausible distortion coefficients."""
 REACH_STEPS = 1000
 """Angles off the optical axis at which a lens' formula is checked."""
+AT_ONCE = 4096
+"""Points that OpenCV projects at once: it also makes 30 derivatives of each, which for many points take longer to store than to compute."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +98,21 @@ class Camera:
         points = transform(self.T_camera_world, points_world)
         flat = points.reshape(-1, 3)
         ahead = flat[:, 2] > 1e-9
-        xy = flat[ahead, :2] / flat[ahead, 2:]
+        seen = flat if ahead.all() else flat[ahead]
+        pixels = self._extended(seen[:, :2] / seen[:, 2:])
+        if seen is not flat:
+            everywhere = np.full((len(flat), 2), np.nan)
+            everywhere[ahead] = pixels
+            pixels = everywhere
+        return pixels.reshape(*points.shape[:-1], 2)
+
+    def _extended(self, xy: Array) -> Array:
+        """Pixels (N, 2) of points (N, 2) on the plane z = 1, extrapolated beyond the `reach`."""
+        if not np.isfinite(self.reach):
+            return self._bent(xy)
         beyond = np.maximum(np.linalg.norm(xy, axis=1, keepdims=True) / self.reach, 1.0)
         within, centre = self._bent(xy / beyond), self.matrix[:2, 2]
-        pixels = np.full((len(flat), 2), np.nan)
-        pixels[ahead] = np.where(beyond > 1, (within - centre) * beyond + centre, within)
-        return pixels.reshape(*points.shape[:-1], 2)
+        return np.where(beyond > 1, (within - centre) * beyond + centre, within)
 
     def _bent(self, xy: Array) -> Array:
         """Pixels (N, 2) of points (N, 2) on the plane z = 1, by OpenCV's formulas without bounds."""
@@ -111,7 +122,9 @@ class Camera:
             return np.zeros((0, 2))  # OpenCV refuses none
         points, still = np.concatenate([xy, np.ones((len(xy), 1))], 1)[:, None], np.zeros(3)
         project = cv2.fisheye.projectPoints if self.fisheye else cv2.projectPoints
-        return np.asarray(project(points, still, still, self.matrix, self.distortion)[0], float).reshape(-1, 2)
+        parts = (points[n : n + AT_ONCE] for n in range(0, len(points), AT_ONCE))
+        pixels = [np.asarray(project(part, still, still, self.matrix, self.distortion)[0], float).reshape(-1, 2) for part in parts]
+        return np.concatenate(pixels)
 
     @cached_property
     def reach(self) -> float:

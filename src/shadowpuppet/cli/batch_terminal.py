@@ -37,7 +37,8 @@ class BatchTerminal(BatchListener):
         self._live = Live(console=terminal.console, get_renderable=self._table, refresh_per_second=4, transient=True)
 
     def begin(self, total: int, before: int) -> None:
-        """Show the table."""
+        """Show the table, in place of the terminal's own progress."""
+        self._terminal.stop()
         self.total, self.before, self._began = total, before, monotonic()
         if not self._terminal.quiet and self._terminal.console.is_terminal:
             self._live.start()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rich.console import Group, RenderableType
 
-from shadowpuppet.cli.tables import pairs, table
+from shadowpuppet.cli.tables import pairs, seen_height, table
 from shadowpuppet.pipeline.look import CameraLook, Look, RigLook
 
 
@@ -72,8 +72,7 @@ def _rig_rows(look: RigLook) -> list[tuple[str, str | None]]:
 
 
 def _rig_scale(look: RigLook) -> list[tuple[str, str | None]]:
-    height = look.agreement.height
-    return [("height", None if height is None else f"{height:.2f} m from end to end, as the cameras see it"),
+    return [("seen", seen_height(look.agreement.height)),
             ("person", _rig_person(look.person) if look.person is not None else None)]
 
 

@@ -56,6 +56,11 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], rig
     return out
 
 
+def seen_height(height: float | None) -> str | None:
+    """The height (m) that the cameras agree on, in words; it is not the person's, which is given or measured."""
+    return None if height is None else f"{height:.2f} m from end to end, with hair, shoes and what is held up"
+
+
 def verdict_table(verdict: Verdict) -> RenderableType:
     """One word, and the reasons below it."""
     joined = "but" if verdict.word == "good" else "because"

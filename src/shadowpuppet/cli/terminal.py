@@ -156,7 +156,7 @@ class Terminal(LiveListener):
 @contextmanager
 def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "nothing was written",
              verbose: bool = False, resume: str = "") -> Iterator[Terminal]:
-    """A listener that shows progress and warnings.
+    """A listener that shows progress and warnings: from the start that the program gets ready, until another phase begins.
 
     After Ctrl-C it names `folder`, which has the frames so far, and how to `resume`, or says `nothing` before the first frame.
     """
@@ -165,6 +165,7 @@ def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "no
         warnings.simplefilter("always", ShadowPuppetWarning)
         warnings.showwarning = listener._show_warning
         try:
+            listener.begin("getting ready")
             yield listener
         except KeyboardInterrupt as interrupt:
             if interrupt.args:

@@ -82,6 +82,8 @@ class Recording:
     """First moment used, seconds after time 0; the frames before are passed over, and times stay those after time 0."""
     truths: tuple[Path, ...] = ()
     """With several people: truth_1.csv, truth_2.csv, ..., one for each."""
+    whole: Recording | None = None
+    """The recording of which this is a part that was asked for; None for all."""
 
 
 def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None) -> Recording:
@@ -124,7 +126,8 @@ def _is_own(folder: Path) -> bool:
 
 def is_recording(folder: Path) -> bool:
     """Whether a folder holds films with what is known about them, so that it is more than a calibration."""
-    return any((folder / name).exists() for name in ("video", "recording.toml")) or find_project(folder) is not None
+    noted = any((folder / name).exists() for name in ("video", "recording.toml"))
+    return noted or find_project(folder) is not None or bool(films_in(folder))
 
 
 def _read_folder(folder: Path, fov: float | None, calibration: Path | None, project: Project | None) -> Recording:
@@ -230,8 +233,8 @@ def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration
         raise RecordingError(f"{folder}: no calibration.toml for its {len(films)} cameras ({choices(films)}); several "
                              "cameras must be calibrated together")
     if fov is None:
-        raise RecordingError(f"{folder}: no calibration: give the camera's horizontal field of view (--fov DEGREES; a phone held "
-                             "across has about 65, a webcam 60) or a calibration.toml")
+        raise RecordingError(f"{folder}: no calibration: give the camera's horizontal field of view (--fov DEGREES, option fov; a "
+                             "phone held across has about 65, held upright 40, a webcam 60) or a calibration.toml")
     name, film = next(iter(films.items()))
     return (Camera.from_fov(open_frames(film).size, fov, name),)
 

@@ -27,7 +27,7 @@ from shadowpuppet.pipeline.person_rig import MultiviewSubject, check_body, fit_i
 from shadowpuppet.pipeline.rig import FrameSet, Segment
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body
-from shadowpuppet.pipeline.survey.rig import OPENED, OPENING
+from shadowpuppet.pipeline.survey.opening import OPENED, OPENING
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 from shadowpuppet.video import Image

@@ -15,16 +15,23 @@ from shadowpuppet.silhouette.background import sample_frames
 from shadowpuppet.video import Image, Size, open_frames
 
 USUAL_FOV = 65.0
-"""Horizontal field of view (degrees) of a webcam, assumed if none is given."""
+"""Field of view (degrees) of a webcam or a phone along the longer side of its pictures, assumed if none is given."""
+
+
+def _usual_fov(size: Size) -> float:
+    """Horizontal field of view (degrees) of pictures of `size` of which nothing is known."""
+    width, height = size
+    return USUAL_FOV if width >= height else float(np.degrees(2 * np.arctan(np.tan(np.radians(USUAL_FOV) / 2) * width / height)))
 
 
 def lens(options: Options, size: Size) -> Camera:
     """The camera for pictures of `size`, from the options. Raises `CalibrationError` if the calibration does not fit."""
     if options.calibration is None:
+        across = options.fov or _usual_fov(size)
         if options.fov is None:
-            warn(f"no field of view is given: {USUAL_FOV:g} degrees are assumed, and depths are as wrong as that; give --fov or "
+            warn(f"no field of view is given: {across:.0f} degrees are assumed, and depths are as wrong as that; give --fov or "
                  "--calibration")
-        return Camera.from_fov(size, float(np.radians(options.fov or USUAL_FOV)))
+        return Camera.from_fov(size, float(np.radians(across)))
     if options.fov is not None:
         raise CalibrationError(f"{options.calibration}: found a field of view and a calibration, expected one of them")
     cameras = read_calibration(options.calibration)

@@ -15,7 +15,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, choices
 from shadowpuppet.io.recording import Recording, View, differ_by_padding, read_recording
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.video import FrameSource, Image, camera_number, open_frames
+from shadowpuppet.video import FrameSource, Image, camera_number, fitted, open_frames
 from shadowpuppet.video.frames import ROUNDING, Wanted
 from shadowpuppet.video.moments import span_of
 from shadowpuppet.video.seeking import Seeker
@@ -105,7 +105,7 @@ class Footage:
         if frames.size != (width, height) and not differ_by_padding(frames.size, (width, height)):
             raise RecordingError(f"{source}: found {what} of {frames.size[0]} x {frames.size[1]} pixels, expected {width} x {height} "
                                  "as the film: it must come from the same camera at the same setting")
-        return (frame.image for frame in open_frames(source, size=self.camera.size, whole=self.view.camera.size))
+        return (frame.image for frame in fitted(frames, self.camera.size, self.view.camera.size))
 
 
 def open_footage(path: str | Path, options: Options) -> Footage:
@@ -149,7 +149,7 @@ def cut(recording: Recording, options: Options) -> Recording:
     length = min(max((each for each in lengths if np.isfinite(each)), default=np.inf), recording.duration or np.inf)
     begin, end = span_of(options.start, options.end, rate, length)
     end = min(end, recording.duration or np.inf)
-    return replace(recording, begin=begin, duration=end if np.isfinite(end) else None)
+    return replace(recording, begin=begin, duration=end if np.isfinite(end) else None, whole=recording)
 
 
 def chosen_views(recording: Recording, names: str | None) -> tuple[View, ...]:
@@ -230,9 +230,23 @@ class Sample:
         return float(np.std(np.diff(self.times))) if len(self.times) > 1 else np.nan
 
 
-def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKED_AT) -> Sample:
-    """Sample the film's first `longest` frames, reading them once. With `need_masks`, raises `SilhouetteError` if ready silhouettes are
-    missing."""
+class Opening(NamedTuple):
+    """Which frames of a film's beginning a sample keeps."""
+
+    seconds: float
+    every: int
+    """Every `every`-th frame is kept."""
+    number: int
+    """Greatest number that is kept."""
+
+    def has(self, frame: int, seconds: float) -> bool:
+        """Whether it has a frame, counted from 0, that comes some seconds after the first moment used; always the first frame."""
+        return frame == 0 or (frame % self.every == 0 and frame < self.every * self.number and seconds <= self.seconds)
+
+
+def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKED_AT, opening: Opening | None = None) -> Sample:
+    """Sample the film's first `longest` frames, reading them once. `opening`: frames to keep of the film's beginning; None for `FIRST`
+    frames, evenly spread over `FIRST_SECONDS`. With `need_masks`, raises `SilhouetteError` if ready silhouettes are missing."""
     film = footage.film
     length = footage.count or (film.duration * film.rate if np.isfinite(film.duration * film.rate) else LOOKED_AT)
     wanted = _spread(min(int(length), longest))
@@ -240,15 +254,19 @@ def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKE
     first, times, begin = list[CameraFrame](), list[float](), footage.recording.begin
     next_first = begin
 
+    def is_first(time: float) -> bool:
+        """Whether the frame read last, of that time (s), is kept as one of the beginning."""
+        return (next_first <= time <= begin + FIRST_SECONDS) if opening is None else opening.has(len(times) - 1, time - begin)
+
     def kept(time: float) -> bool:
         times.append(time)
-        return len(times) - 1 in wanted or next_first <= time <= begin + FIRST_SECONDS or len(times) == longest
+        return len(times) - 1 in wanted or is_first(time) or len(times) == longest
 
     for frame in footage.frames(ready=True, strict=need_masks, wanted=kept):
         if (n := len(times) - 1) in wanted:
             runs.setdefault(wanted[n], []).append(frame)
-        if next_first <= frame.time <= begin + FIRST_SECONDS:
-            first.append(frame)
+        if is_first(frame.time):
+            first.append(frame if need_masks else frame._replace(ready=None))
             next_first = frame.time + 0.99 * FIRST_SECONDS / FIRST
         if len(times) == longest:
             break
@@ -257,7 +275,8 @@ def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKE
 
 def spread_frames(footage: Footage, number: int = SPREAD) -> list[Image]:
     """`number` images spread over the whole film, or all if there are fewer, found by seeking; none if the film does not state its
-    length."""
+    length. If only a part of the recording is used, those of all of it: a person hardly moves in a few seconds."""
+    footage = replace(footage, recording=footage.recording.whole or footage.recording)
     film, length = footage.film, footage.count
     if length is None or not np.isfinite(film.rate):
         return []

@@ -161,6 +161,8 @@ class FilmNoise(NamedTuple):
     """Standard deviation (3,) of the smoothed Y, Cr, Cb about the empty scene, grey levels."""
     share: NDArray[np.float64]
     """The same (3,) over that after the least smoothing."""
+    least: NDArray[np.float64]
+    """The same (3,) after the least smoothing."""
 
     @property
     def noisy(self) -> bool:
@@ -176,12 +178,12 @@ class FilmNoise(NamedTuple):
 def measured_noise(frames: list[Image], mean: Floats) -> FilmNoise:
     """The noise of a film's frames about the background `mean` (H, W, 3); none without frames."""
     if not frames:
-        return FilmNoise(SMOOTHING, np.zeros(3), np.ones(3))
+        return FilmNoise(SMOOTHING, np.zeros(3), np.ones(3), np.zeros(3))
     least = film_noise(frames, smoothed(mean))
     if least[0] < NOISY:
-        return FilmNoise(SMOOTHING, least, np.ones(3))
+        return FilmNoise(SMOOTHING, least, np.ones(3), least)
     more = film_noise(frames, smoothed(mean, NOISY_SMOOTHING), partial(smoothed, smoothing=NOISY_SMOOTHING))
-    return FilmNoise(NOISY_SMOOTHING, more, np.minimum(more / np.maximum(least, 1e-3), 1))
+    return FilmNoise(NOISY_SMOOTHING, more, np.minimum(more / np.maximum(least, 1e-3), 1), least)
 
 
 def picture_of(background: Background) -> Image:

@@ -13,10 +13,10 @@ from shadowpuppet.errors import SettingsError
 from shadowpuppet.silhouette import background as scene
 from shadowpuppet.silhouette.areas import AreaFilter
 from shadowpuppet.silhouette.background import Background, FilmNoise, Floats, Image
-from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile, outline_width
+from shadowpuppet.silhouette.boundary import SHARP_WIDTH, Contrast, EdgeProfile, Labels, outline_width
 from shadowpuppet.silhouette.channels import KeyChoice, choose_key
 from shadowpuppet.silhouette.classifiers import METHODS, AreaColours, ChannelClassifier, EmptyScene, edge_jitter
-from shadowpuppet.silhouette.cleanup import Window, coarse_person
+from shadowpuppet.silhouette.cleanup import Window, bounding_window, coarse_person
 from shadowpuppet.silhouette.correction.detail import lost_detail
 from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.segmenter import Segmenter
@@ -55,11 +55,14 @@ def learn_background(images: Iterable[Image], settings: SilhouetteSettings | Non
     frames = plain = [correction(frame).image for frame in _sample(film, background)]
     if settings.method != "averaging" and (detail := lost_detail(correction.scene, plain)) is not None:
         correction, frames = replace(correction, detail=detail), [detail(frame) for frame in plain]
-    channels = _channel_classifier(background, frames, settings, plain)
+    noise = scene.measured_noise(frames, background.mean)
+    channels = _channel_classifier(background, frames, settings, plain, noise)
     choice = _choose(background, frames, channels, settings)
     classifier = METHODS[choice.key].build(EmptyScene(background, channels, settings, observer))
     least = MIN_EDGE_CONTRAST * settings.factor / float(channels.inverse_sigma[..., 0].max())
-    segmenter = Segmenter(background, settings, *choice, EdgeProfile(SHARP_WIDTH, least), classifier, correction, covered)
+    about = noise.least if frames is plain else _noise_of(plain, background, scene.SMOOTHING)
+    segmenter = Segmenter(background, settings, *choice, EdgeProfile(SHARP_WIDTH, least), classifier, correction, covered,
+                          noise=float(about[0]))
     return replace(segmenter, edge=EdgeProfile(_outline_width(segmenter, frames), least))
 
 
@@ -72,11 +75,11 @@ def _sample(film: Iterable[Image] | None, background: Background) -> list[Image]
 
 
 def _channel_classifier(background: Background, frames: list[Image], settings: SilhouetteSettings,
-                        plain: list[Image]) -> ChannelClassifier:
-    """The classifier of all channels; `plain`: the `frames` before lost detail was restored, or they themselves."""
+                        plain: list[Image], noise: FilmNoise) -> ChannelClassifier:
+    """The classifier of all channels; `plain`: the `frames` before lost detail was restored, or they themselves; `noise`: theirs."""
     # Without colour, dark grey clothes and a shadow are the same.
     darkest = DARKEST_SHADOW if settings.shadow and _coloured(background, frames) else 1.0
-    noise, smeared = scene.measured_noise(frames, background.mean), plain is not frames
+    smeared = plain is not frames
     if smeared:  # what restoring leaves has long tails: blocks of wrong colours
         noise = noise._replace(sigma=_noise_of(plain, background, noise.smoothing))
     mean = scene.smoothed(background.mean, noise.smoothing)
@@ -97,7 +100,7 @@ def _area_colours(background: Background, frames: list[Image], noise: FilmNoise,
     mean = average(background.mean)
     sigma = scene.film_noise(frames, mean, average)
     least = noise.sigma / np.maximum(noise.share, 1e-3)
-    averaged = FilmNoise(noise.smoothing, sigma, np.minimum(sigma / np.maximum(least, 1e-3), 1))
+    averaged = FilmNoise(noise.smoothing, sigma, np.minimum(sigma / np.maximum(least, 1e-3), 1), least)
     return AreaColours(average, mean, (1 / assumed_sigma(background, averaged, settings.noise_floor, mean)).astype(np.float32))
 
 
@@ -129,5 +132,10 @@ def _coloured(background: Background, frames: list[Image]) -> bool:
 
 
 def _outline_width(segmenter: Segmenter, frames: list[Image]) -> int:
-    people = ((coarse_person(segmenter.classifier(frame)), segmenter.contrast(frame)) for frame in frames)
-    return outline_width((mask, contrast) for mask, contrast in people if mask.any())
+    def cut(frame: Image) -> tuple[Labels, Contrast]:
+        """The person and the contrast in the rows and columns around them: what is beyond says nothing about the outline."""
+        mask = coarse_person(segmenter.classifier(frame))
+        window = bounding_window(mask, 1)
+        return mask[window], segmenter.contrast(frame, window)
+
+    return outline_width(person for person in map(cut, frames) if person[0].any())

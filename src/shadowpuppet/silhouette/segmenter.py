@@ -83,6 +83,9 @@ class Segmenter:
     """Undoes what has changed since the empty scene; None: nothing."""
     covered: NDArray[np.bool_] | None = None
     """Pixels (H, W) that the person covers in every frame, so that the scene there is unknown (`recovery.recover_scene`); None for none."""
+    noise: float = 0.0
+    """Standard deviation of the film's frames that it was learnt with about the empty scene, after correction and the least smoothing, grey
+    levels of brightness; 0 without them."""
     several: bool = False
     """Whether masks keep all parts of a person's size, for several people, or the largest part, one person's."""
 

@@ -16,8 +16,8 @@ from shadowpuppet.video.frames import Frame, FrameSource, Image, Size, Wanted
 from shadowpuppet.video.images import IMAGE_SUFFIXES, open_folder, open_picture, read_image, write_image
 from shadowpuppet.video.writer import FrameWriter, write_frames
 
-__all__ = ["FILM_SUFFIXES", "IMAGE_SUFFIXES", "Frame", "FrameSource", "FrameWriter", "Image", "Size", "camera_number", "open_frames",
-           "read_image", "write_frames", "write_image"]
+__all__ = ["FILM_SUFFIXES", "IMAGE_SUFFIXES", "Frame", "FrameSource", "FrameWriter", "Image", "Size", "camera_number", "fitted",
+           "open_frames", "read_image", "write_frames", "write_image"]
 
 
 def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | None = None, rate: float | None = None,
@@ -49,6 +49,11 @@ def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | No
         frames = open_picture(path, grey)
     else:
         frames = open_film(path, grey, rate)
+    return fitted(frames, size, whole)
+
+
+def fitted(frames: FrameSource, size: Size | None, whole: Size | None = None) -> FrameSource:
+    """A source of the same frames, first cut or filled up to the size `whole`, then scaled to `size`; None leaves them as they are."""
     if whole is not None and whole != frames.size:
         frames = _filled(frames, whole)
     return frames if size in (None, frames.size) else _scaled(frames, size)

@@ -16,7 +16,7 @@ from shadowpuppet.threads import thread_limit
 from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, Wanted, check_size, size_of
 
 if TYPE_CHECKING:
-    from av import VideoFrame
+    from av import Packet, VideoFrame
     from av.container import InputContainer
     from av.video.stream import VideoStream
 
@@ -37,7 +37,7 @@ STUDIO_TO_FULL = np.clip(np.round((np.arange(256) - 16) * (255 / 219)), 0, 255).
 
 def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
     """A source of a film's frames; decodes the first one to find the size. Raises `VideoError`."""
-    with opened(path) as (container, stream):
+    with opened(path, threads=1) as (container, stream):
         try:
             first = next(decoded(container, stream), None)
         except Break:
@@ -62,7 +62,7 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
 
 def tells_times(path: Path) -> bool:
     """Whether a film's first frames have time stamps. Raises `VideoError`."""
-    with opened(path) as (container, stream), contextlib.suppress(Break):
+    with opened(path, threads=1) as (container, stream), contextlib.suppress(Break):
         frames = decoded(container, stream)
         return all(frame.pts is not None or frame.dts is not None for frame, _ in zip(frames, range(3)))
     return True  # damaged; reported elsewhere
@@ -111,8 +111,9 @@ class Break(Exception):
 
 
 @contextlib.contextmanager
-def opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
-    """Open a film; gives its container and video stream. Raises `VideoError`."""
+def opened(path: Path, threads: int | None = None) -> Iterator[tuple[InputContainer, VideoStream]]:
+    """Open a film; gives its container and video stream. `threads` that decode: each of several has a frame of its own before the first
+    comes, so that one is quicker for a few frames. Raises `VideoError`."""
     import av
     import av.error
 
@@ -128,12 +129,15 @@ def opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
         if not streams or container.format.name == "tty":  # FFmpeg renders text files as video
             raise VideoError(f"{path}: no video stream in it; a film or a picture is expected")
         streams[0].thread_type = "AUTO"
-        streams[0].codec_context.thread_count = thread_limit() or 0  # 0: FFmpeg's default
+        streams[0].codec_context.thread_count = threads or thread_limit() or 0  # 0: FFmpeg's default
         yield container, streams[0]
 
 
-def decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFrame]:
-    """Frames in order of presentation. Raises `Break` after the last undamaged frame of a damaged film."""
+def decoded(container: InputContainer, stream: VideoStream, needless: Callable[[Packet], bool] | None = None) -> Iterator[VideoFrame]:
+    """Frames in order of presentation. Raises `Break` after the last undamaged frame of a damaged film.
+
+    needless: whether a packet's frame is not wanted, so that it is left out if no other refers to it: half of a film's frames, often.
+    """
     import av.error
 
     packets, broken, last = container.demux(stream), "", None
@@ -141,6 +145,8 @@ def decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFra
         try:
             if (packet := next(packets, None)) is None:
                 return
+            if needless is not None:
+                stream.codec_context.skip_frame = "NONREF" if needless(packet) else "DEFAULT"
             if packet.is_corrupt and last:  # partial, at the end of a cut file
                 frames, broken = _held(stream, last), "a cut picture"
             else:

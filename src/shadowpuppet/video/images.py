@@ -62,13 +62,13 @@ def check_image(path: Path, image: Image) -> None:
 
 def open_picture(path: Path, grey: bool) -> FrameSource:
     """A picture as a source of one frame."""
-    size = size_of(read_image(path, grey))
+    image = read_image(path, grey)
 
     def read(wanted: Wanted) -> Iterator[Frame]:
         if wanted(0.0):
-            yield Frame(0.0, read_image(path, grey))
+            yield Frame(0.0, image.copy())
 
-    return FrameSource(str(path), size, math.nan, 1, math.nan, read)
+    return FrameSource(str(path), size_of(image), math.nan, 1, math.nan, read)
 
 
 def open_folder(folder: Path, grey: bool, rate: float | None) -> FrameSource:

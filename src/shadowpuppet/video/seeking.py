@@ -16,10 +16,12 @@ from shadowpuppet.video.frames import ASSUMED_RATE, Image, Size
 from shadowpuppet.video.images import IMAGE_SUFFIXES, in_folder, read_image
 
 if TYPE_CHECKING:
-    from av import VideoFrame
+    from av import Packet, VideoFrame
 
 MAX_DECODED = 1.0
 """Largest step ahead, seconds, for which frames are decoded one by one; for larger steps the container's index is used."""
+NEEDED = 4
+"""Frame intervals before the wanted time from which on every frame is decoded; of those before only what others refer to."""
 
 
 class Seeker:
@@ -106,6 +108,7 @@ class _Film:
         self.container, self.stream = self.stack.enter_context(opened(path))
         self.step = 1 / float(self.stream.average_rate or self.stream.guessed_rate or rate or ASSUMED_RATE)
         self.zero: int | None = None
+        self.wanted = 0.0
         self.held: _Decoded | None = None
         self.waiting: _Decoded | None = None
         self.frames = self._read()
@@ -122,7 +125,7 @@ class _Film:
         self.stack.close()
 
     def at(self, time: float) -> Image | None:
-        wanted = time * self.scale
+        self.wanted = wanted = time * self.scale
         reached = self.waiting or self.held
         if reached is None or wanted > reached.time + MAX_DECODED or (self.held is not None and wanted < self.held.time - self.step / 4):
             self._seek(wanted)
@@ -158,11 +161,18 @@ class _Film:
         self.frames = self._read()
         self._advance()
 
+    def _needless(self, packet: Packet) -> bool:
+        """Whether a packet's frame comes well before the wanted one."""
+        base = self.stream.time_base
+        if self.zero is None or packet.pts is None or base is None:
+            return False
+        return float((packet.pts - self.zero) * base) < self.wanted - NEEDED * self.step
+
     def _read(self) -> Iterator[_Decoded]:
         """Frames from the container's position; without time stamps they are counted from the start."""
         base, last = self.stream.time_base, -self.step
         with contextlib.suppress(Break):
-            for frame in decoded(self.container, self.stream):
+            for frame in decoded(self.container, self.stream, self._needless):
                 stamp = frame.pts if frame.pts is not None else frame.dts
                 if stamp is None or base is None:
                     last += self.step

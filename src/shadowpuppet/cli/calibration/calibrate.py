@@ -60,9 +60,9 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
     from shadowpuppet.evaluation.report.calibration_page import calibration_page
     from shadowpuppet.io.calibration.calibration_files import read_calibration
 
-    session = open_session(lab, None if board is None else _board(lab, board, square, dictionary))
-    known = {camera.name: camera for camera in read_calibration(lenses)} if lenses is not None else None
     with terminal() as listener:
+        session = open_session(lab, None if board is None else _board(lab, board, square, dictionary))
+        known = {camera.name: camera for camera in read_calibration(lenses)} if lenses is not None else None
         done = 0
 
         def begin(what: str, count: int) -> None:

@@ -11,7 +11,7 @@ from rich.console import Group, RenderableType
 
 from shadowpuppet.cli.calibration.explain import is_explained
 from shadowpuppet.cli.flags import AsJson, Config, LookFlags, Switch, options_from
-from shadowpuppet.cli.tables import pairs, show, show_json, table
+from shadowpuppet.cli.tables import pairs, seen_height, show, show_json, table
 from shadowpuppet.errors import RecordingError
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def check_table(check: CalibrationCheck) -> RenderableType:
         ("recording", check.recording),
         ("compared", f"{check.sets} sets of silhouettes, {check.rate:.4g} a second, of {check.frame_rate:.4g} frames/s"),
         ("limit", f"{found.limit:.1f} px; cameras that fit are apart by about one"),
-        ("height", None if found.height is None else f"{found.height:.2f} m from end to end, as the cameras see it"),
+        ("seen", seen_height(found.height)),
         ("time", "by the films' sound" if check.by_sound else "cannot tell: nobody moves enough" if check.still else None),
         ("sound", _heard(check)),
     ]

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.geometry import Array
@@ -95,6 +94,8 @@ def speeds(times: Array, points: Array) -> Array:
     if known.any(axis=1).sum() < 2:
         return np.full(points.shape[:2], np.nan)
     step = float(np.median(np.diff(times)))
+    from scipy.ndimage import gaussian_filter1d  # takes a third of a second to import
+
     smooth = gaussian_filter1d(filled(times, points), WINDOW / step, axis=0, mode="nearest")
     return np.where(known, np.linalg.norm(np.gradient(smooth, times, axis=0), axis=2), np.nan)
 

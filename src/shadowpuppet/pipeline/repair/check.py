@@ -18,7 +18,7 @@ from shadowpuppet.calibration.time_offset import TimeOffsets, time_offsets
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
 from shadowpuppet.pipeline.footage import Footage, take_sample
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, uncluttered_silhouettes
 from shadowpuppet.pipeline.survey.film import brief_length
@@ -103,9 +103,9 @@ def gather_silhouettes(rig: Rig, options: Options, listener: Listener, whole: bo
     a second as tell delays."""
     every = max(1, min(round(rig.rate / MAX_SET_RATE), (rig.count or SETS * 9) // MIN_SETS))
     every = max(every, (rig.count or 0) // SETS) if whole else every
-    listener.begin("looking")
+    steps = Steps(listener, rig.names)
     with ThreadPoolExecutor(usable_cores(), "check") as pool:
-        segments = [each.segmented for each in pool.map(lambda footage: _silhouettes(footage, options), rig.footage)]
+        segments = [each.segmented for each in pool.map(lambda footage: _silhouettes(footage, options, steps), rig.footage)]
     rows: list[Row] = []
     listener.begin("reading", SETS)
     with warnings.catch_warnings():
@@ -120,8 +120,13 @@ def gather_silhouettes(rig: Rig, options: Options, listener: Listener, whole: bo
     return SilhouetteSets(rows, every)
 
 
-def _silhouettes(footage: Footage, options: Options) -> Silhouettes:
-    return uncluttered_silhouettes(footage, take_sample(footage, options.masks, brief_length(footage, options)), options)
+def _silhouettes(footage: Footage, options: Options, steps: Steps) -> Silhouettes:
+    steps("reading the film", footage.camera.name)
+    sample = take_sample(footage, options.masks, brief_length(footage, options))
+    steps("making silhouettes", footage.camera.name)
+    found = uncluttered_silhouettes(footage, sample, options)
+    steps("", footage.camera.name)
+    return found
 
 
 def judge_calibration(rig: Rig, sets: SilhouetteSets) -> CalibrationCheck:

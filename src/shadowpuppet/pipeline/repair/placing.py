@@ -31,8 +31,9 @@ STANDING = 80
 """Percentile of the heights of the visual hull that counts as the person's: walking and bending people are lower."""
 EXTREMES = 4
 """Number of the hull's points whose mean is its top, or its bottom."""
-LEVEL_SD, SOLE_SD = np.radians(5.0), 0.02
-"""Standard deviations of a rough calibration's vertical, rad, and of a hull's lowest place over the floor, metres."""
+LEVEL_SD, END_SD, FLOOR_QUANTILE = np.radians(5.0), 0.02, 0.8
+"""Standard deviations of a rough calibration's vertical, rad, and of a hull's ends, metres; the share of the lowest ends at or below the
+floor."""
 LEAST_POINTS, LEAST_HULLS = 50, 10
 """Least number of points of a hull, and of hulls, whose ends are used."""
 DOUBT_FACTOR = 3.0
@@ -128,27 +129,37 @@ def _ends(cameras: Sequence[Camera], rows: Sequence[Row]) -> _Ends | None:
 
 
 def _floor(ends: _Ends) -> tuple[Array, float]:
-    """The motion (4, 4) of the world that puts the lowest places on z = 0, and its tilt (rad). A plane is fitted to them robustly; where
-    they lie along a line or at one place, the rough calibration's vertical decides (a prior)."""
+    """The motion (4, 4) of the world that puts the floor on z = 0, and its tilt (rad).
+
+    Feet stand on one plane, and crowns, but for walking's ups and downs, lie on another above it. Both are fitted at once, robustly. A hull
+    ends at or below the soles, as few cameras may see them: its lowest places have the floor as an upper quantile. Where they lie along a
+    line or at one place, the rough calibration's vertical decides (a prior).
+    """
     from scipy.optimize import least_squares
 
     middle = np.median(ends.bottom, axis=0)
-    away = ends.bottom - middle
 
-    def misfit(plane: Array) -> Array:
-        return (away[:, 2] - away[:, :2] @ plane[:2] - plane[2]) / SOLE_SD
+    def heights(places: Array, plane: Array, k: int) -> Array:
+        away = places - middle
+        return (away[:, 2] - away[:, :2] @ plane[:2] - plane[k]) / END_SD
 
     def cost(plane: Array) -> Array:
-        robust = np.sqrt(2 * (np.sqrt(1 + misfit(plane) ** 2) - 1))  # soft L1, beside a quadratic prior
-        return np.r_[robust, plane[:2] / np.tan(LEVEL_SD)]
+        low, high = heights(ends.bottom, plane, 2), heights(ends.top, plane, 3)
+        pulls = np.where(low > 0, FLOOR_QUANTILE, 1 - FLOOR_QUANTILE)
+        return np.r_[np.sqrt(2 * pulls) * _soft(low), _soft(high), plane[:2] / np.tan(LEVEL_SD)]
 
-    plane = least_squares(cost, np.zeros(3)).x
+    plane = least_squares(cost, np.r_[np.zeros(3), np.median(ends.top[:, 2]) - middle[2]]).x
     up = unit(np.array([-plane[0], -plane[1], 1.0]))
     axis = np.cross(up, [0.0, 0.0, 1.0])
     sine, angle = float(np.linalg.norm(axis)), float(np.arccos(np.clip(up[2], -1, 1)))
     R = rotation_from_vector(axis / sine * angle) if sine > 1e-9 else np.eye(3)
     ground = middle + plane[2] * np.array([0.0, 0.0, 1.0])
     return rigid(R, ground * [1, 1, 0] - R @ ground), angle
+
+
+def _soft(values: Array) -> Array:
+    """Residuals whose squares are soft L1 losses."""
+    return np.sqrt(2 * (np.sqrt(1 + values**2) - 1))
 
 
 def _above(level: Array, places: Array) -> Array:

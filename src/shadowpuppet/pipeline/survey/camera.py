@@ -31,6 +31,9 @@ from shadowpuppet.silhouette.added import SceneHint
 
 SHORT = 1.0
 """Length of a film, seconds, under which it is said to be short."""
+UPRIGHT, WIDE = 40.0, 55.0
+"""Horizontal field of view, degrees, of a phone held upright; and from which on an upright film's is doubted: it would be that of a phone
+held across."""
 UNEVEN = 0.1
 """Jitter over the frame interval above which the film's rate counts as variable."""
 
@@ -95,6 +98,10 @@ def _doubts(look: Look, footage: Footage) -> list[Caution]:
         doubts.append(Caution(f"no calibration: the camera is taken for level, with a field of view of {look.fov:.0f} degrees and no "
                               "distortion; depths and the world's axes are as good as that; give a calibration.toml",
                               "camera not calibrated: depths are rough; give --calibration", NOTED))
+    if not look.calibrated and look.size[0] < look.size[1] and look.fov > WIDE:
+        doubts.append(Caution(f"the film is upright: {look.fov:.0f} degrees are what a phone sees held across, held upright it sees about "
+                              f"{UPRIGHT:.0f} from left to right; with a wrong one all depths are wrong; give --fov {UPRIGHT:.0f}",
+                              f"upright film: --fov of a phone is then about {UPRIGHT:.0f}", NOTED))
     if subject.height is None and subject.distance is None:
         doubts.append(Caution(f"neither height nor distance is known: the {look.scale}, and all lengths are as wrong as that is; give "
                               "--height", "height not known, so no length is: give --height", HARMFUL))

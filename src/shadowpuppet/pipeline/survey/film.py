@@ -9,7 +9,7 @@ import numpy as np
 
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.motion.metrics import overlap
-from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Sample, take_sample
+from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Opening, Sample, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Steps
 from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
@@ -38,12 +38,12 @@ class FilmSurvey(NamedTuple):
 
 
 def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT, hint: SceneHint | None = None,
-                steps: Steps | None = None) -> FilmSurvey:
-    """Examine one camera's first `longest` frames. `hint`: what is known of its scene from a first look and fit. Raises a
-    `ShadowPuppetError` if something cannot be used."""
+                steps: Steps | None = None, opening: Opening | None = None) -> FilmSurvey:
+    """Examine one camera's first `longest` frames. `hint`: what is known of its scene from a first look and fit; `opening` as in
+    `take_sample`. Raises a `ShadowPuppetError` if something cannot be used."""
     steps = steps or Steps(None, [footage.camera.name])
     steps("reading the film", footage.camera.name)
-    sample = take_sample(footage, options.masks, longest)
+    sample = take_sample(footage, options.masks, longest, opening)
     empty = "learning" if footage.view.background is not None else "recovering"
     steps(f"{empty} the empty scene, making silhouettes" if not options.masks else "reading silhouettes", footage.camera.name)
     silhouettes, runs = _made(footage, sample, options, None if hint is None else hint.added)

@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from itertools import islice
 
 import numpy as np
 
 from shadowpuppet.calibration.agreement import agreement
 from shadowpuppet.camera.mask import may_be_person
-from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution, ShadowPuppetWarning
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, RigLook, Survey
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.census import later_sets, sampled_sets, take_census
 from shadowpuppet.pipeline.progress import Listener, Steps
-from shadowpuppet.pipeline.rig import Rig, synchronized_frames
-from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.survey.cautions import GOOD, clutter_cautions, condition_cautions, recovery_cautions, unlike_ready
 from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, survey_film
+from shadowpuppet.pipeline.survey.opening import OPENING, first_seconds, opening_of
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import usable_cores
-from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 
-OPENING, OPENED = 2.0, 40
-"""With several cameras: duration (s) of the beginning in which the person is measured, and the greatest number of frame sets kept of it."""
 SILHOUETTES_OR_CAMERAS = "silhouettes do not fit together: film the empty scene, or calibrate"
 """Ten words on an agreement that an empty scene recovered from the film may have spoiled."""
 RATES, LENGTHS = 0.02, 0.1
@@ -37,10 +32,10 @@ RATES, LENGTHS = 0.02, 0.1
 def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), listener: Listener | None = None) -> Survey:
     """Examine each camera's film, and the first seconds of all together; `hints` as in `survey_film`, by camera. Raises a
     `ShadowPuppetError` if something cannot be used."""
-    steps = Steps(listener, rig.names)
+    steps, opening = Steps(listener, rig.names), opening_of(rig)
 
     def surveyed(footage: Footage, hint: SceneHint) -> FilmSurvey:
-        return survey_film(footage, options, brief_length(footage, options), hint, steps)
+        return survey_film(footage, options, brief_length(footage, options), hint, steps, opening)
 
     with ThreadPoolExecutor(usable_cores(), "look") as pool:
         films = list(pool.map(surveyed, rig.footage, hints or [SceneHint()] * len(rig.footage)))
@@ -53,7 +48,7 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     several = census.number if census is not None and census.number > 1 else 0
     silhouettes = wide if several else silhouettes
     steps("silhouettes of the first seconds in all films")
-    first = _first_sets(rig, silhouettes, options.masks)
+    first = first_seconds(rig, silhouettes, [film.sample for film in films], opening, options.masks)
     steps("do the cameras agree")
     step = float(np.median(np.diff(first.times))) if len(first.times) > 1 else np.nan
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
@@ -70,17 +65,6 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
 
 def _shows_person(film: FilmSurvey) -> bool:
     return any(may_be_person(mask) for mask in film.masks)
-
-
-def _first_sets(rig: Rig, silhouettes: Sequence[Silhouettes], ready: bool) -> FirstSeconds:
-    every = max(1, round(OPENING * rig.rate / OPENED))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when the run comes to it
-        frames = synchronized_frames(rig, [each.segmented for each in silhouettes], ready=ready, every=every, threads=usable_cores(),
-                                     share=SharedShadows(rig.cameras))
-        sets = [(each.time, each.masks) for each in islice(frames, OPENED)]
-    sets = [each for each in sets if each[0] <= OPENING] or sets[:1]
-    return FirstSeconds([time for time, _ in sets], [masks for _, masks in sets])
 
 
 def _camera_look(footage: Footage, film: FilmSurvey) -> CameraLook:

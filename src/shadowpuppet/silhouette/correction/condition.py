@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
-from shadowpuppet.silhouette.background import Image, film_noise, smoothed, to_planes
+from shadowpuppet.silhouette.background import Image, smoothed, to_planes
 from shadowpuppet.silhouette.correction.frame_correction import Corrected, Correction
 from shadowpuppet.silhouette.correction.motion_blur import blurred_share
 from shadowpuppet.silhouette.segmenter import Segmenter
@@ -138,9 +138,8 @@ def film_condition(segmenter: Segmenter, runs: Sequence[Sequence[tuple[float, Im
     still = np.flatnonzero(moved == 0)
     first = int(still[-1]) + 1 if len(still) else 0
     change, copied = _changes(corrected)
-    noise = film_noise([image for run in corrected for image in run[::2]], smoothed(segmenter.background.mean))
     return FilmCondition(
-        noise=float(noise[0]), change=change, copied=copied, gain=(float(gains.min()), float(gains.max())),
+        noise=segmenter.noise, change=change, copied=copied, gain=(float(gains.min()), float(gains.max())),
         moved=float(moved.max()), moved_frames=float((moved > 0).mean()),
         moved_since=frames[first][0] if first < len(frames) else None,
         unmatched=float(np.mean([not state.matched for state in states])),

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.body.upper_body import BEND, TWIST
@@ -47,6 +46,8 @@ def turns(motion: Motion, leans: Array | None = None) -> list[int]:
     if TWIST not in motion.dof_names or not motion.known.any():
         return []
     twist = filled(motion.times, motion.poses[:, motion.dof_names.index(TWIST)])
+    from scipy.ndimage import median_filter  # takes a third of a second to import
+
     steady, found = median_filter(twist, 3, mode="nearest"), list[int]()
     for begin, end in true_runs(np.abs(steady) > NEAR):
         peak, lasted = begin + int(np.abs(steady[begin:end]).argmax()), motion.times[end - 1] - motion.times[begin]

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
-from scipy.ndimage import gaussian_filter1d
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import filled
@@ -71,6 +70,8 @@ def smooth(times: Array, points: Array, sd: Array, least: Array, rounds: int = R
 def jerks(times: Array, points: Array, least: Array) -> Array:
     """Variances (T - 3, M) of the jerk, along each axis, between four frames, from the local speeds of points (T, M, 3)."""
     step = float(np.median(np.diff(times)))
+    from scipy.ndimage import gaussian_filter1d  # takes a third of a second to import
+
     speed = gaussian_filter1d((np.gradient(points, times, axis=0) ** 2).sum(2), WINDOW / step, axis=0, mode="nearest")
     acceleration = np.maximum(PACE**2 * speed, least**2)
     between = 0.5 * (acceleration[1:-2] + acceleration[2:-1])

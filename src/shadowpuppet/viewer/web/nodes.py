@@ -20,13 +20,13 @@ NOWHERE = np.array([0.0, 0.0, -1e4])
 """Position of unknown bones: out of sight."""
 COLOURS = {"truth": (64, 196, 122), "other": None, "mean": None, "estimate": None}
 """Colours by kind of figure; None: those of the mesh, left warm and right blue."""
-BLENDED = {"other": ((150, 98, 196), 0.55), "mean": ((150, 156, 164), 0.35)}
-"""Colours mixed into those of a kind, and their share."""
+BLENDED = {"estimate": ((40, 50, 70), 0.3), "other": ((150, 98, 196), 0.55), "mean": ((150, 156, 164), 0.35)}
+"""Colours mixed into those of a kind, and their share: those of the mesh are too pale for a white page."""
 BY_CAMERA = np.array([(0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233), (213, 94, 0), (240, 228, 66)], np.uint8)
 """Colours of cameras (Okabe and Ito 2008) and of the hull points on their contours."""
 TRANSPARENT_OPACITY = 0.75
 """Opacity of transparent figures."""
-PALE_OPACITY = 0.35
+PALE_OPACITY = 0.5
 """Opacity of limbs that are not vouched for."""
 
 

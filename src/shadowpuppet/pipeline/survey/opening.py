@@ -1,0 +1,71 @@
+"""The beginning of a recording of several cameras: the silhouettes of its frame sets, in which the person is measured."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
+
+import numpy as np
+
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.pipeline.footage import CameraFrame, Opening, Sample
+from shadowpuppet.pipeline.look import FirstSeconds
+from shadowpuppet.pipeline.rig import Rig, synchronized_frames
+from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.threads import usable_cores
+from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
+
+OPENING, OPENED = 2.0, 40
+"""Length (s) of the beginning in which the person is measured, and the greatest number of frame sets kept of it."""
+IN_STEP = 0.25
+"""Greatest difference of the times of frame n of all films, over the least interval of two frames, with which it makes set n."""
+
+
+def opening_of(rig: Rig) -> Opening:
+    """The frames of the beginning from which the person is measured."""
+    return Opening(OPENING, max(1, round(OPENING * rig.rate / OPENED)), OPENED)
+
+
+def first_seconds(rig: Rig, silhouettes: Sequence[Silhouettes], samples: Sequence[Sample], opening: Opening, ready: bool) -> FirstSeconds:
+    """Silhouettes of the opening's frame sets, of the frames that the samples kept of it; films that are not in step, and `ready`
+    silhouettes, are read once more."""
+    kept = None if ready else kept_sets(rig, samples, opening)
+    return _read_sets(rig, silhouettes, opening, ready) if kept is None else _segmented(rig, silhouettes, kept)
+
+
+def kept_sets(rig: Rig, samples: Sequence[Sample], opening: Opening) -> list[tuple[CameraFrame, ...]] | None:
+    """The opening's frame sets, of the frames that the samples kept of it; None if the films do not have their frames at the same times, so
+    that it is not frame n of each that belongs to set n."""
+    times = samples[rig.leaders[0]].times[: opening.every * opening.number]
+    times = times[times <= rig.recording.begin + opening.seconds]
+    if len(times) < 2 or any(len(each.times) < len(times) for each in samples):
+        return None
+    apart = max(float(np.abs(each.times[: len(times)] - times).max()) for each in samples)
+    if apart > IN_STEP * float(np.diff(times).min()):
+        return None
+    number = -(-len(times) // opening.every)
+    firsts = [each.first[:number] for each in samples]
+    return list(zip(*firsts, strict=True)) if all(len(each) == number for each in firsts) else None
+
+
+def _segmented(rig: Rig, silhouettes: Sequence[Silhouettes], sets: Sequence[tuple[CameraFrame, ...]]) -> FirstSeconds:
+    share = SharedShadows(rig.cameras)
+
+    def masks(frames: tuple[CameraFrame, ...]) -> tuple[Mask | None, ...]:
+        return share([each.segmented(frame) for each, frame in zip(silhouettes, frames, strict=True)])
+
+    with ThreadPoolExecutor(usable_cores(), "look") as pool:
+        return FirstSeconds([frames[rig.leaders[0]].time for frames in sets], list(pool.map(masks, sets)))
+
+
+def _read_sets(rig: Rig, silhouettes: Sequence[Silhouettes], opening: Opening, ready: bool) -> FirstSeconds:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when the run comes to it
+        frames = synchronized_frames(rig, [each.segmented for each in silhouettes], ready=ready, every=opening.every,
+                                     threads=usable_cores(), share=SharedShadows(rig.cameras))
+        sets = [(each.time, each.masks) for each in islice(frames, opening.number)]
+    sets = [each for each in sets if each[0] <= rig.recording.begin + opening.seconds] or sets[:1]
+    return FirstSeconds([time for time, _ in sets], [masks for _, masks in sets])
