@@ -18,7 +18,7 @@ from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.repair.placing import _above, _Ends, _floor, place_cameras, write_placed
 from shadowpuppet.pipeline.rig import open_rig
 
-TALL = 1.76
+TALL = 1.73
 """Height of the made person, metres: from the legs' lower ends to the crown."""
 GROWN, TILT = 1.15, np.radians(2.0)
 
