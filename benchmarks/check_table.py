@@ -84,7 +84,8 @@ def row(fault: Fault, found: CalibrationCheck) -> Sequence[str]:
     pixels = f"{worst} {apart[worst]:.1f}, others up to {max(v for n, v in apart.items() if n != worst):.1f}"
     frames = dict(zip(found.lateness.names, found.lateness.frames)) if found.lateness is not None else {}
     late = ", ".join(f"{name} {value:+.1f}" for name, value in frames.items() if name in found.late and value is not None)
-    turns = ", ".join(f"{name} {turn.right:+.1f} {turn.down:+.1f} {turn.clockwise:+.1f}" for name, (turn, _) in found.turns.items())
+    turns = ", ".join(f"{name} {turn.right:+.1f} {turn.down:+.1f} {turn.clockwise:+.1f}"
+                      + (f", {100 * turn.distance:.0f} cm" if turn.distance else "") for name, (turn, _) in found.turns.items())
     true = ", ".join(f"{steps * round(found.frame_rate / found.rate):+d}" for steps in fault.late if steps)
     remedy = next((doubt.split(", it seems")[0] for doubt in found.doubts if "it seems" in doubt), "")
     return fault.name + (f" ({true} frames)" if true else ""), pixels, turns, late, remedy or ("" if found.doubts else "all agree")
@@ -103,7 +104,7 @@ def main() -> None:
     options = Options(masks=given.masks)
     rig = open_rig(given.recording, options)
     seen = gather_silhouettes(rig, options, Listener())
-    print("| what is wrong | pixels | turned right, down, clockwise, ° | late, frames | said |\n|---|---|---|---|---|")
+    print("| what is wrong | pixels | turned right, down, clockwise, °, and moved | late, frames | said |\n|---|---|---|---|---|")
     for fault in islice(faults(), given.faults):
         print("| " + " | ".join(row(fault, judge_calibration(*with_fault(rig, seen, fault)))) + " |", flush=True)
 

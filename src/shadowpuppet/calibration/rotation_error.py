@@ -1,4 +1,4 @@
-"""Rotation of a camera since it was calibrated, estimated from the silhouettes of all cameras."""
+"""Rotation of a camera since it was calibrated, and its displacement, estimated from the silhouettes of all cameras."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ import numpy as np
 
 from shadowpuppet.calibration.epipolar_tangency import tangent_angles
 from shadowpuppet.calibration.silhouettes import Outline, Row, outlines_of
+from shadowpuppet.calibration.solve.tangency_bundle import place_by_outlines
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.geometry import Array, rigid, rotation_from_vector
+from shadowpuppet.errors import CalibrationError
+from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
 
+PUSHED_ANGLE, PUSHED_PLACE = np.radians(10.0), 0.15
+"""Standard deviations of a pushed tripod's rotation (rad) and displacement (m) along each axis."""
 OUTLIER_PIXELS = 1.0
 """Scale (pixels) of the soft L1 loss: some tangents belong to a limb that is missing in a silhouette."""
 
@@ -27,15 +31,24 @@ class RotationError:
     before: float
     after: float
     """Median distance of its tangents from the others', pixels, as calibrated and as rotated."""
+    moved: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Displacement of its centre in the world, metres."""
 
     @property
     def degrees(self) -> float:
         """Angle of the whole rotation, degrees."""
         return float(np.linalg.norm([self.right, self.down, self.clockwise]))
 
+    @property
+    def distance(self) -> float:
+        """Length of the displacement, metres."""
+        return float(np.linalg.norm(self.moved))
+
     def of(self, camera: Camera) -> Camera:
-        """The camera with this rotation applied."""
-        return _rotated(camera, np.radians([self.down, -self.right, -self.clockwise]))
+        """The camera with this rotation and displacement applied."""
+        turned = _rotated(camera, np.radians([self.down, -self.right, -self.clockwise]))
+        R = turned.T_camera_world[:3, :3]
+        return replace(turned, T_camera_world=rigid(R, -R @ (camera.centre + self.moved)))
 
 
 def estimate_rotation_error(cameras: Sequence[Camera], rows: Sequence[Row], n: int) -> RotationError | None:
@@ -68,6 +81,21 @@ def estimate_rotation_error(cameras: Sequence[Camera], rows: Sequence[Row], n: i
     x, y, z = np.degrees(best)
     return RotationError(right=float(-y), down=float(x), clockwise=float(-z), before=float(np.nanmedian(np.abs(start))),
                 after=float(np.nanmedian(np.abs(distances(best)))))
+
+
+def estimate_place_error(cameras: Sequence[Camera], rows: Sequence[Row], n: int) -> RotationError | None:
+    """The rotation and displacement of camera `n`, as of a tripod that was pushed, that bring its tangents nearest to the others'; None
+    with too few tangents, or fewer than two others."""
+    if len(cameras) < 3:
+        return None
+    try:
+        fit = place_by_outlines(cameras, rows, [n], rough=(PUSHED_ANGLE, PUSHED_PLACE))
+    except CalibrationError:
+        return None
+    before, now = cameras[n], fit.cameras[n]
+    x, y, z = np.degrees(vector_from_rotation(now.T_camera_world[:3, :3] @ before.T_camera_world[:3, :3].T)).tolist()
+    dx, dy, dz = (now.centre - before.centre).tolist()
+    return RotationError(right=-y, down=x, clockwise=-z, moved=(dx, dy, dz), before=float(fit.before[n]), after=float(fit.after[n]))
 
 
 def _rotated_outline(outline: Outline, before: Camera, after: Camera) -> Outline:

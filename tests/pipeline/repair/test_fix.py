@@ -34,6 +34,22 @@ def sets_of(masks, late=(0, 0, 0, 0), frames=50):
     return SilhouetteSets([silhouettes_of([masks[8 + f - steps][k] for k, steps in enumerate(late)]) for f in range(frames)], 1)
 
 
+def test_a_pushed_tripod_is_put_back(copy, cameras, masks):
+    """One degree and five centimetres."""
+    turn = rigid(rotation_from_vector(np.radians([0.6, 0.8, 0.0])), np.zeros(3)) @ cameras[1].T_camera_world
+    turn[:3, 3] -= turn[:3, :3] @ [0.04, 0.03, 0.0]
+    write_calibration(copy / "calibration.toml", [cameras[0], replace(cameras[1], T_camera_world=turn), *cameras[2:]])
+    rig, sets = open_rig(copy, Options(masks=True)), sets_of(masks)
+    check = judge_calibration(rig, sets)
+    fix = fix_recording(rig, Checked(check, sets, sets))
+    assert list(check.turns) == [cameras[1].name]
+    _, before, after = fix.pixels[1]
+    assert after is not None
+    assert after < 0.5 < before
+    if check.turns[cameras[1].name].turn.distance:
+        assert "moved back by" in fix.done[0]
+
+
 def test_a_late_film_and_a_turned_camera_are_mended(copy, cameras, masks):
     turn = rigid(rotation_from_vector(np.radians([0.0, 2.0, 0.0])), np.zeros(3))
     wrong = [replace(camera, T_camera_world=turn @ camera.T_camera_world) if n == 2 else camera for n, camera in enumerate(cameras)]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.calibration.agreement import MAX_DISAGREEMENT, Agreement, compare_cameras
-from shadowpuppet.calibration.rotation_error import RotationError, estimate_rotation_error
+from shadowpuppet.calibration.rotation_error import RotationError, estimate_place_error, estimate_rotation_error
 from shadowpuppet.calibration.silhouettes import Row, silhouettes_of
 from shadowpuppet.calibration.sound_offset import SoundOffsets
 from shadowpuppet.calibration.time_offset import TimeOffsets, time_offsets
@@ -38,7 +38,9 @@ SLIGHT_DISAGREEMENT = 0.004
 STANDOUT_FACTOR = 3.0
 """Ratio to the median disagreement above which a camera is reported although no rotation explains it."""
 ROTATION_SHARE = 0.5
-"""A rotation is reported if it leaves at most this share of the disagreement."""
+"""A rotation is reported if it leaves at most this share of the disagreement; a displacement, too, if it leaves this share of the rest."""
+SLIGHT_PIXELS, MAX_PUSH = 0.7, 0.25
+"""Disagreement of a camera, pixels, that a rotation may leave without a displacement being looked for; the greatest of these, metres."""
 
 
 class RotationFix(NamedTuple):
@@ -167,7 +169,7 @@ def _judged(rig: Rig, rows: Sequence[Row]) -> _Judgement:
         return _Judgement(found, {}, None, still)
     first = _with_times(rig, rows, found, chosen)
     if not any(first.shifts):
-        return first
+        return first._replace(rotations=first.rotations | _pushed(rig, first, chosen))
     aligned = aligned_sets(rows, first.shifts)
     second = _with_times(rig, rows, compare_cameras(rig.cameras, aligned, remedies=False), aligned)
     return second if second.left() < first.left() else first._replace(shifts=still)  # not a time offset
@@ -201,13 +203,34 @@ def _rotations(rig: Rig, found: Agreement, rows: Sequence[Row]) -> dict[str, Rot
     fixes = {}
     for name in found.wrong or _standing_out(found, 1.0):
         n = rig.names.index(name)
-        rotation, apart = estimate_rotation_error(rig.cameras, rows, n), found.apart[n]
-        if rotation is not None and apart is not None:
-            cameras = [rotation.of(camera) if k == n else camera for k, camera in enumerate(rig.cameras)]
-            after = compare_cameras(cameras, rows, remedies=False).apart[n]
-            if after is not None and after < ROTATION_SHARE * apart and after < found.limit:
-                fixes[name] = RotationFix(rotation, after)
+        fix, apart = _undone(rig, estimate_rotation_error(rig.cameras, rows, n), rows, n), found.apart[n]
+        if fix is not None and apart is not None and fix.apart < ROTATION_SHARE * apart and fix.apart < found.limit:
+            fixes[name] = fix
     return fixes
+
+
+def _pushed(rig: Rig, found: _Judgement, rows: Sequence[Row]) -> dict[str, RotationFix]:
+    """Displacements of the cameras that disagree, or else of the outlier, if they leave much less than a rotation. Of films in step only:
+    before a late film a walking person is elsewhere, as if the camera were."""
+    fixes, agreement = {}, found.agreement
+    for name in agreement.wrong or _standing_out(agreement, 1.0):
+        n = rig.names.index(name)
+        left = found.rotations[name].apart if name in found.rotations else agreement.apart[n]
+        if left is None or left < SLIGHT_PIXELS:
+            continue
+        fix = _undone(rig, estimate_place_error(rig.cameras, rows, n), rows, n)
+        if fix is not None and fix.turn.distance < MAX_PUSH and fix.apart < ROTATION_SHARE * left and fix.apart < agreement.limit:
+            fixes[name] = fix
+    return fixes
+
+
+def _undone(rig: Rig, error: RotationError | None, rows: Sequence[Row], n: int) -> RotationFix | None:
+    """What an estimated error of camera `n` leaves if it is undone; None if it, or what is left, is not known."""
+    if error is None:
+        return None
+    cameras = [error.of(camera) if k == n else camera for k, camera in enumerate(rig.cameras)]
+    after = compare_cameras(cameras, rows, remedies=False).apart[n]
+    return None if after is None else RotationFix(error, after)
 
 
 def _standing_out(found: Agreement, times: float) -> tuple[str, ...]:
@@ -251,8 +274,9 @@ def doubts_of(check: CalibrationCheck) -> list[str]:
         text = f"camera {name!r} disagrees with the others by {found.apart[found.names.index(name)]:.1f} pixels, they by {rest:.1f} at most"
         if name in check.turns:
             rotation, after = check.turns[name]
-            text += (f"; it is as if it had been turned by {rotation.degrees:.1f} degrees ({_directions(rotation)}) since it was "
-                     f"calibrated: turned back, {after:.1f} pixels would be left")
+            moved, back = (f" and moved by {100 * rotation.distance:.0f} cm", "put") if rotation.distance else ("", "turned")
+            text += (f"; it is as if it had been turned by {rotation.degrees:.1f} degrees ({_directions(rotation)}){moved} since it was "
+                     f"calibrated: {back} back, {after:.1f} pixels would be left")
         said.append(f"{text}; calibrate it again, or leave it out: --camera {','.join(others)}")
     return said
 

@@ -56,7 +56,9 @@ def fix_recording(rig: Rig, checked: Checked) -> Fix:
         write_calibration(path, [found.turns[view.camera.name].turn.of(view.camera) if view.camera.name in found.turns else view.camera
                                  for view in rig.recording.views])
         files += [path, *([kept] if kept is not None else [])]
-        done += [f"calibration.toml: {name} turned back by {fix.turn.degrees:.2f} degrees" for name, fix in found.turns.items()]
+        done += [f"calibration.toml: {name} turned back by {fix.turn.degrees:.2f} degrees"
+                 + (f" and moved back by {100 * fix.turn.distance:.1f} cm" if fix.turn.distance else "")
+                 for name, fix in found.turns.items()]
         notes["calibration"] = None
     files += write_notes(folder / "recording.toml", notes)
     return Fix(done=tuple(done), files=tuple(map(str, files)), pixels=pixels)
