@@ -91,7 +91,7 @@ def place_by_outlines(cameras: Sequence[Camera], rows: Sequence[Row], free: Sequ
     found = [_distances(cameras, hulls, pair) for pair in pairs]
     _check(cameras, pairs, found, free)
     size = max(max(camera.size) for camera in cameras) / 1000
-    now, value = list(cameras), np.zeros((len(cameras), 6))
+    value = np.zeros((len(cameras), 6))
     for scale in LOSS_SCALES:
         value = _minimised(cameras, hulls, pairs, value, free, scale * size, rough)
     now = _moved(cameras, value)
@@ -235,14 +235,14 @@ def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Seque
     gradients by blocks of sets: neighbouring silhouettes err together). If all cameras are free, within the rig: not of what a motion or
     a scale of the whole rig changes."""
     found = [_distances(cameras, hulls, pair) for pair in pairs]
-    parts, size, last = list(_linearised(cameras, hulls, pairs, np.zeros((len(cameras), 6)), found)), 6 * len(cameras), 0
+    parts, size = list(_linearised(cameras, hulls, pairs, np.zeros((len(cameras), 6)), found)), 6 * len(cameras)
     H, _ = _normal(parts, size, scale)
-    last = max(int(pair.sets[-1]) for pair in pairs) + 1
+    sets = max(int(pair.sets[-1]) for pair in pairs) + 1
     blocks = np.zeros((BLOCKS, size))
     for part in parts:
         pulls = part.slopes * (part.values / np.sqrt(1 + (part.values / scale) ** 2))
         for k, column in enumerate(part.columns):
-            blocks[:, column] += np.bincount(part.sets * BLOCKS // last, pulls[k], BLOCKS)
+            blocks[:, column] += np.bincount(part.sets * BLOCKS // sets, pulls[k], BLOCKS)
     places = [6 * n + k for n in free for k in range(6)]
     basis = np.linalg.svd(_whole_rig(cameras).T)[2][7:].T if len(free) == len(cameras) else np.eye(len(places))
     spread = basis @ np.linalg.pinv(basis.T @ H[np.ix_(places, places)] @ basis, hermitian=True) @ basis.T @ blocks[:, places].T
