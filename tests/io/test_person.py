@@ -77,7 +77,7 @@ def test_a_file_written_by_hand_needs_the_sizes_only(tmp_path):
     ("height = true\n[sizes]\n" + lines(), "height: found True"),
     ("source = 7\n[sizes]\n" + lines(), "source: found 7, expected text in quotes"),
     ("height = \n", "not valid TOML"),
-    ('body = "ball"\n[sizes]\n' + lines(), "body: found 'ball', expected one of anatomical, boxes, cardbox, cardbox_bends, cylinders, rounded"),
+    ('body = "ball"\n[sizes]\n' + lines(), "body: found 'ball', expected one of anatomical, boxes, cardbox, cardbox_bends"),
     ("body = 3\n[sizes]\n" + lines(), "body: found 3, expected one of"),
     ('body = "anatomical"\n[sizes]\n' + lines(), "sizes: unknown .*; the sizes are: ankle_height"),
     ('body = "cylinders"\n', "sizes: found None, expected a table \\[sizes\\] with ankle_height"),
