@@ -112,6 +112,13 @@ def test_the_command_shows_what_it_did(lab, tmp_path, capsys):
     assert len(read_calibration(tmp_path / "new.toml")) == len(lab[1])
 
 
+def test_a_single_camera_is_refused(lab):
+    options = make_options({"masks": True})
+    rig = open_rig(lab[0], options)
+    with pytest.raises(CalibrationError, match="lab: found one camera, expected two or more"):
+        place_cameras(replace(rig, footage=rig.footage[:1]), options)
+
+
 def test_a_camera_without_a_place_is_refused(lab):
     options = make_options({"masks": True})
     unknown: Any = SimpleNamespace(cameras=[replace(camera, oriented=False) for camera in open_rig(lab[0], options).cameras])

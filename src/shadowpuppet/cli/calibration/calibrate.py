@@ -90,9 +90,10 @@ def _from_person(recording: Path, height: float | None, masks: bool, to: Path | 
     from shadowpuppet.pipeline.repair.placing import place_cameras, write_placed
     from shadowpuppet.pipeline.rig import open_rig
 
+    options = make_options({"height": height, "masks": masks})
     with terminal() as listener:
-        rig = open_rig(recording, make_options({"height": height, "masks": masks}))
-        placed = place_cameras(rig, make_options({"height": height, "masks": masks}), listener)
+        rig = open_rig(recording, options)
+        placed = place_cameras(rig, options, listener)
         written = write_placed(rig, placed, to)
         listener.stop()
         show(placed_table(placed, rig.cameras), pairs([("written", "\n".join(map(str, written)))]))

@@ -78,6 +78,8 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None) 
     The scale is the one at which the person is as tall as `options.height` or the recording's; without, the rough calibration's. Raises
     `CalibrationError` if too little of the person is seen by two cameras at a time, or a camera's rough place is not known.
     """
+    if len(rig.cameras) < 2:
+        raise CalibrationError(f"{rig.recording.path}: found one camera, expected two or more: outlines are compared")
     for camera in rig.cameras:
         if not camera.oriented:
             raise CalibrationError(f"camera {camera.name!r}: found only a field of view, expected also where it stands, roughly")
