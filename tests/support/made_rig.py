@@ -55,12 +55,12 @@ def masks(made: Sequence[Camera], frames: int = FRAMES, first: int = 0) -> list[
 
 
 def shifted(seen: Sequence[Sequence[Mask]], late: Sequence[int], frames: int = 50) -> list[list[Mask]]:
-    """Silhouettes as cameras see them whose films are late by so many frames, at most ten."""
+    """Silhouettes of films that begin late by a number of frames each, at most ten."""
     return [[seen[10 + f - steps][k] for k, steps in enumerate(late)] for f in range(frames)]
 
 
 def moved(camera: Camera, right: float = 0.0, down: float = 0.0, clockwise: float = 0.0) -> Camera:
-    """The calibration of a camera that was turned since by so many degrees."""
+    """The calibration of a camera that was turned by these angles (degrees) afterwards."""
     vector = -np.radians([down, -right, -clockwise])
     return replace(camera, T_camera_world=rigid(rotation_from_vector(vector), np.zeros(3)) @ camera.T_camera_world)
 

@@ -83,7 +83,7 @@ class Recording:
     truths: tuple[Path, ...] = ()
     """With several people: truth_1.csv, truth_2.csv, ..., one for each."""
     whole: Recording | None = None
-    """The recording of which this is a part that was asked for; None for all."""
+    """The whole recording, where this is a part of it (`--start`, `--end`); None otherwise."""
 
 
 def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None) -> Recording:

@@ -19,7 +19,7 @@ USUAL_FOV = 65.0
 
 
 def _usual_fov(size: Size) -> float:
-    """Horizontal field of view (degrees) of pictures of `size` of which nothing is known."""
+    """Horizontal field of view (degrees) that is assumed for pictures of `size` from an unknown camera."""
     width, height = size
     return USUAL_FOV if width >= height else float(np.degrees(2 * np.arctan(np.tan(np.radians(USUAL_FOV) / 2) * width / height)))
 
