@@ -20,11 +20,10 @@ from faults import into_page
 
 from shadowpuppet.calibration.solve.tangency_bundle import place_by_outlines
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.geometry import Array, align, evenly_spread, rigid, rotation_from_vector, unit, vector_from_rotation
+from shadowpuppet.geometry import Array, align, rigid, rotation_from_vector, unit, vector_from_rotation
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.progress import Listener
-from shadowpuppet.pipeline.repair.check import gather_silhouettes
-from shadowpuppet.pipeline.repair.placing import DOUBT_FACTOR, SETS, grounded
+from shadowpuppet.pipeline.repair.placing import DOUBT_FACTOR, compared_sets, grounded
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.synthetic import Gesture, Mannequin, Ring, Scene, Spec, synthesize
 
@@ -69,8 +68,7 @@ def errors(found: Sequence[Camera], true: Sequence[Camera]) -> tuple[float, floa
 def rows(path: Path, options: Options, height: float | None, seeds: int, rough: Sequence[tuple[float, float]]) -> Iterator[str]:
     """A row of the table for each roughness, means over seeds."""
     rig = open_rig(path, options)
-    sets = gather_silhouettes(rig, options, Listener(), whole=True).rows
-    sets = [sets[n] for n in evenly_spread(len(sets), SETS)]
+    sets = compared_sets(rig, options, Listener())
     for degrees, metres in rough:
         figures = list[Array]()
         for seed in range(seeds if degrees else 1):

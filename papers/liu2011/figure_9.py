@@ -55,9 +55,9 @@ def as_bends(names: tuple[str, ...], poses: Array) -> tuple[tuple[str, ...], Arr
 def deviations(names: tuple[str, ...], runs: dict[str, Runs]) -> dict[str, tuple[tuple[str, ...], dict[str, Array]]]:
     """For each choice of the elbows' coordinates, the names of the degrees of freedom and, by method, their standard deviations over the
     runs, (T, D), rad or m."""
-    hinge = {method: each.poses.std(0) for method, each in runs.items()}
-    bends = {method: as_bends(names, each.poses)[1].std(0) for method, each in runs.items()}
-    return {"roll and flexion": (names, hinge), "bends": (as_bends(names, next(iter(runs.values())).poses)[0], bends)}
+    read = {"roll and flexion": {method: (names, each.poses) for method, each in runs.items()},
+            "bends": {method: as_bends(names, each.poses) for method, each in runs.items()}}
+    return {how: (found["DRS"][0], {method: poses.std(0) for method, (_, poses) in found.items()}) for how, found in read.items()}
 
 
 def smaller(sd: dict[str, Array]) -> Array:

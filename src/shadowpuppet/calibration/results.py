@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from shadowpuppet.calibration.session import Calibrated
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, reason
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
@@ -20,9 +21,7 @@ def write_results(found: Calibrated, path: Path, page: Callable[[Calibrated], st
     if path.suffix.lower() != ".toml":
         raise CalibrationError(f"{path}: found the ending {path.suffix!r}, expected .toml; `shadowpuppet info FILE --to` writes other "
                                "formats")
-    kept = keep_old(path)
-    write_calibration(path, found.cameras)
-    written = [path, *([kept] if kept is not None else [])]
+    written = replace_calibration(path, found.cameras)
     if page is not None:
         beside = path.with_suffix(".html")
         try:
@@ -31,6 +30,13 @@ def write_results(found: Calibrated, path: Path, page: Callable[[Calibrated], st
             raise CalibrationError(f"{beside}: cannot be written ({reason(error)})") from None
         written.append(beside)
     return written
+
+
+def replace_calibration(path: Path, cameras: Sequence[Camera]) -> list[Path]:
+    """Write a calibration (.toml), and keep one that is there under another name; returns the files written. Raises `CalibrationError`."""
+    kept = keep_old(path)
+    write_calibration(path, cameras)
+    return [path, *([kept] if kept is not None else [])]
 
 
 def keep_old(path: Path) -> Path | None:

@@ -78,9 +78,7 @@ def estimate_rotation_error(cameras: Sequence[Camera], rows: Sequence[Row], n: i
         return None
     best = least_squares(lambda v: np.nan_to_num(distances(v), nan=0.0), np.zeros(3), loss="soft_l1",
                          f_scale=OUTLIER_PIXELS, x_scale=0.02, diff_step=1e-3, max_nfev=40).x
-    x, y, z = np.degrees(best)
-    return RotationError(right=float(-y), down=float(x), clockwise=float(-z), before=float(np.nanmedian(np.abs(start))),
-                after=float(np.nanmedian(np.abs(distances(best)))))
+    return _error_of(best, np.zeros(3), np.nanmedian(np.abs(start)), np.nanmedian(np.abs(distances(best))))
 
 
 def estimate_place_error(cameras: Sequence[Camera], rows: Sequence[Row], n: int) -> RotationError | None:
@@ -93,9 +91,14 @@ def estimate_place_error(cameras: Sequence[Camera], rows: Sequence[Row], n: int)
     except CalibrationError:
         return None
     before, now = cameras[n], fit.cameras[n]
-    x, y, z = np.degrees(vector_from_rotation(now.T_camera_world[:3, :3] @ before.T_camera_world[:3, :3].T)).tolist()
-    dx, dy, dz = (now.centre - before.centre).tolist()
-    return RotationError(right=-y, down=x, clockwise=-z, moved=(dx, dy, dz), before=float(fit.before[n]), after=float(fit.after[n]))
+    turn = vector_from_rotation(now.T_camera_world[:3, :3] @ before.T_camera_world[:3, :3].T)
+    return _error_of(turn, now.centre - before.centre, fit.before[n], fit.after[n])
+
+
+def _error_of(turn: Array, moved: Array, before: float, after: float) -> RotationError:
+    """Of a rotation vector (3,) along a camera's axes, rad, and a displacement (3,), metres."""
+    (x, y, z), (dx, dy, dz) = np.degrees(turn).tolist(), moved.tolist()
+    return RotationError(right=-y, down=x, clockwise=-z, moved=(dx, dy, dz), before=float(before), after=float(after))
 
 
 def _rotated_outline(outline: Outline, before: Camera, after: Camera) -> Outline:

@@ -19,7 +19,7 @@ from shadowpuppet.calibration.epipolar_tangency import MAX_ANGULAR_EXTENT
 from shadowpuppet.calibration.silhouettes import Row
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
-from shadowpuppet.geometry import Array, rigid, rotation_from_vector
+from shadowpuppet.geometry import Array, rigid, rotation_from_vector, unit
 from shadowpuppet.threads import one_blas_thread
 
 ROUGH_ANGLE, ROUGH_PLACE = np.radians(10.0), 0.5
@@ -96,7 +96,7 @@ def place_by_outlines(cameras: Sequence[Camera], rows: Sequence[Row], free: Sequ
         value = _minimised(cameras, hulls, pairs, value, free, scale * size, rough)
     now = _moved(cameras, value)
     last = [_distances(now, hulls, pair) for pair in pairs]
-    place_sd, angle_sd = _deviations(now, hulls, pairs, free, LOSS_SCALES[-1] * size)
+    place_sd, angle_sd = _deviations(now, hulls, pairs, last, free, LOSS_SCALES[-1] * size)
     values = np.concatenate([each[np.isfinite(each)] for each in last])
     return TangencyFit(cameras=tuple(now), before=_medians(len(cameras), pairs, found), after=_medians(len(cameras), pairs, last),
                        place_sd=place_sd, angle_sd=angle_sd, tangents=len(values), far=float((np.abs(values) > FAR_PIXELS * size).mean()))
@@ -141,8 +141,8 @@ def _distances(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pair: _Pair) 
     line = line / length
     aside = [rays - (rays @ line)[..., None] * line
              for rays in (hulls[n].rays[pair.sets] @ cameras[n].T_camera_world[:3, :3] for n in pair[:2])]
-    ahead = sum(_unit(each.sum(1)) for each in aside)
-    ahead = _unit(np.where(np.linalg.norm(ahead, axis=1, keepdims=True) > 1e-6, ahead, aside[0].sum(1)))
+    ahead = sum(unit(each.sum(1)) for each in aside)
+    ahead = unit(np.where(np.linalg.norm(ahead, axis=1, keepdims=True) > 1e-6, ahead, aside[0].sum(1)))
     up, sets = np.cross(line, ahead), np.arange(len(out))
     angles = [np.arctan2((each * up[:, None]).sum(2), (each * ahead[:, None]).sum(2)) for each in aside]
     usable = np.maximum(*(np.ptp(each, axis=1) for each in angles)) <= MAX_ANGULAR_EXTENT
@@ -163,7 +163,7 @@ def _minimised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequen
     found = [_distances(_moved(cameras, value), hulls, pair) for pair in pairs]
     cost = _loss(found, scale) + float((prior * value.ravel()[places] ** 2).sum()) / 2
     for _ in range(STEPS):
-        H, g = _normal(_linearised(cameras, hulls, pairs, value, found), value.size, scale)
+        H, g = _normal(_linearised(cameras, hulls, pairs, value, found, free), value.size, scale)
         H, g = H[np.ix_(places, places)] + np.diag(prior), g[places] + prior * value.ravel()[places]
         gain = 0.0
         for _ in range(8):
@@ -203,15 +203,19 @@ class _Linear(NamedTuple):
     """Of shape (K,)."""
 
 
-def _linearised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], value: Array,
-                found: Sequence[Array]) -> Iterator[_Linear]:
-    """The distances `found` at increments (C, 6) and, by differences, their derivatives."""
+def _linearised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], value: Array, found: Sequence[Array],
+                free: Sequence[int]) -> Iterator[_Linear]:
+    """The distances `found` at increments (C, 6) of pairs with a `free` camera and, by differences, their derivatives; 0 by the increments
+    of the others."""
     now = _moved(cameras, value)
-    nudged = [[_moved_one(camera, own + step) for step in np.eye(6) * NUDGE] for camera, own in zip(cameras, value)]
+    nudged = {n: [_moved_one(cameras[n], value[n] + step) for step in np.eye(6) * NUDGE] for n in free}
     for pair, base in zip(pairs, found):
+        moving = [(side, n) for side, n in enumerate(pair[:2]) if n in nudged]
+        if not moving:
+            continue
         known = np.isfinite(base)
         slopes = np.zeros((12, known.sum()))
-        for side, n in enumerate(pair[:2]):
+        for side, n in moving:
             for k in range(6):
                 there = [*now[:n], nudged[n][k], *now[n + 1 :]]
                 slopes[6 * side + k] = np.nan_to_num((_distances(there, hulls, pair)[known] - base[known]) / NUDGE)
@@ -219,28 +223,32 @@ def _linearised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Seque
         yield _Linear(columns, slopes, base[known], np.repeat(pair.sets[:, None], 2, 1)[known])
 
 
+def _weights(values: Array, scale: float) -> Array:
+    """Weights (K,) of squared distances (K,) with which their slope is the soft L1 loss's."""
+    return 1 / np.sqrt(1 + (values / scale) ** 2)
+
+
 def _normal(parts: Iterable[_Linear], size: int, scale: float) -> tuple[Array, Array]:
     """Normal equations (size, size) and gradient (size,) of the loss."""
     H, g = np.zeros((size, size)), np.zeros(size)
     for part in parts:
-        weighted = part.slopes / np.sqrt(1 + (part.values / scale) ** 2)
+        weighted = part.slopes * _weights(part.values, scale)
         H[np.ix_(part.columns, part.columns)] += weighted @ part.slopes.T
         g[part.columns] += weighted @ part.values
     return H, g
 
 
-def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], free: Sequence[int],
-                scale: float) -> tuple[Array, Array]:
+def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], found: Sequence[Array],
+                free: Sequence[int], scale: float) -> tuple[Array, Array]:
     """Standard deviations of centres (C,), m, and directions (C,), rad, from how much parts of the film would move them (a "sandwich" of
     gradients by blocks of sets: neighbouring silhouettes err together). If all cameras are free, within the rig: not of what a motion or
     a scale of the whole rig changes."""
-    found = [_distances(cameras, hulls, pair) for pair in pairs]
-    parts, size = list(_linearised(cameras, hulls, pairs, np.zeros((len(cameras), 6)), found)), 6 * len(cameras)
+    parts, size = list(_linearised(cameras, hulls, pairs, np.zeros((len(cameras), 6)), found, free)), 6 * len(cameras)
     H, _ = _normal(parts, size, scale)
     sets = max(int(pair.sets[-1]) for pair in pairs) + 1
     blocks = np.zeros((BLOCKS, size))
     for part in parts:
-        pulls = part.slopes * (part.values / np.sqrt(1 + (part.values / scale) ** 2))
+        pulls = part.slopes * _weights(part.values, scale) * part.values
         for k, column in enumerate(part.columns):
             blocks[:, column] += np.bincount(part.sets * BLOCKS // sets, pulls[k], BLOCKS)
     places = [6 * n + k for n in free for k in range(6)]
@@ -275,7 +283,3 @@ def _medians(count: int, pairs: Sequence[_Pair], found: Sequence[Array]) -> Arra
     own = [np.concatenate([np.abs(each[np.isfinite(each)]) for pair, each in zip(pairs, found) if n in pair[:2]] or [np.zeros(0)])
            for n in range(count)]
     return np.array([np.median(each) if len(each) else np.nan for each in own])
-
-
-def _unit(vectors: Array) -> Array:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)

@@ -10,9 +10,8 @@ from typing import Any
 import tomli_w
 
 from shadowpuppet.calibration.agreement import compare_cameras
-from shadowpuppet.calibration.results import keep_old
+from shadowpuppet.calibration.results import keep_old, replace_calibration
 from shadowpuppet.errors import RecordingError, reason
-from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import read_toml, write_whole
 from shadowpuppet.pipeline.repair.check import aligned_sets
 from shadowpuppet.pipeline.repair.films import Checked
@@ -51,11 +50,9 @@ def fix_recording(rig: Rig, checked: Checked) -> Fix:
         notes["start"] = found.starts
         done.append("recording.toml: [start] " + ", ".join(f"{name} = {value:.4g}" for name, value in found.starts.items()))
     if found.turns:
-        path = folder / "calibration.toml"
-        kept = keep_old(path)
-        write_calibration(path, [found.turns[view.camera.name].turn.of(view.camera) if view.camera.name in found.turns else view.camera
-                                 for view in rig.recording.views])
-        files += [path, *([kept] if kept is not None else [])]
+        files += replace_calibration(folder / "calibration.toml", [
+            found.turns[view.camera.name].turn.of(view.camera) if view.camera.name in found.turns else view.camera
+            for view in rig.recording.views])
         done += [f"calibration.toml: {name} turned back by {fix.turn.degrees:.2f} degrees"
                  + (f" and moved back by {100 * fix.turn.distance:.1f} cm" if fix.turn.distance else "")
                  for name, fix in found.turns.items()]

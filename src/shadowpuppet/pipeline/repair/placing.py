@@ -9,13 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.calibration.results import keep_old
+from shadowpuppet.calibration.results import replace_calibration
 from shadowpuppet.calibration.silhouettes import Row
 from shadowpuppet.calibration.solve.tangency_bundle import TangencyFit, place_by_outlines
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, evenly_spread, inverse, rigid, rotation_from_vector, unit
-from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.repair.check import gather_silhouettes
@@ -25,10 +24,10 @@ from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 
 SETS = 90
 """Number of sets, over all of the films, whose outlines are compared."""
-MAX_CROUCH = 1.03
-"""Ratio of that height to the median from which on the person is not upright enough for a scale."""
 STANDING = 80
 """Percentile of the heights of the visual hull that counts as the person's: walking and bending people are lower."""
+MAX_CROUCH = 1.03
+"""Ratio of that height to the median from which on the person is not upright enough for a scale."""
 EXTREMES = 4
 """Number of the hull's points whose mean is its top, or its bottom."""
 LEVEL_SD, END_SD, FLOOR_QUANTILE = np.radians(5.0), 0.02, 0.8
@@ -84,12 +83,17 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None) 
         if not camera.oriented:
             raise CalibrationError(f"camera {camera.name!r}: found only a field of view, expected also where it stands, roughly")
     listener = listener or Listener()
-    rows = gather_silhouettes(rig, options, listener, whole=True).rows
-    rows = [rows[n] for n in evenly_spread(len(rows), SETS)]
+    rows = compared_sets(rig, options, listener)
     listener.begin("placing the cameras")
     fit = place_by_outlines(rig.cameras, rows)
     listener.begin("floor and height")
     return grounded(fit, rows, options.height or rig.recording.subject.height)
+
+
+def compared_sets(rig: Rig, options: Options, listener: Listener) -> list[Row]:
+    """The silhouettes whose outlines are compared: `SETS` sets, spread over all of the films."""
+    rows = gather_silhouettes(rig, options, listener, whole=True).rows
+    return [rows[n] for n in evenly_spread(len(rows), SETS)]
 
 
 def grounded(fit: TangencyFit, rows: Sequence[Row], height: float | None) -> Placed:
@@ -195,9 +199,7 @@ def write_placed(rig: Rig, placed: Placed, path: Path | None = None) -> list[Pat
     own = path == rig.recording.path / "calibration.toml"
     if not path.parent.is_dir():
         raise CalibrationError(f"{path}: its folder does not exist")
-    kept = keep_old(path)
     places = {camera.name: camera.T_camera_world for camera in placed.cameras}
-    write_calibration(path, [replace(view.camera, T_camera_world=places.get(view.camera.name, view.camera.T_camera_world))
-                             for view in rig.recording.views])
-    notes = write_notes(rig.recording.path / "recording.toml", {"calibration": None}) if own else []
-    return [path, *([kept] if kept is not None else []), *notes]
+    written = replace_calibration(path, [replace(view.camera, T_camera_world=places.get(view.camera.name, view.camera.T_camera_world))
+                                         for view in rig.recording.views])
+    return [*written, *(write_notes(rig.recording.path / "recording.toml", {"calibration": None}) if own else [])]
