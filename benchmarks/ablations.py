@@ -34,7 +34,7 @@ from shadowpuppet.io.person import read_person, write_person
 from shadowpuppet.pipeline.batch import make_grid, run_batch
 from shadowpuppet.pipeline.batch.summary import BatchRun
 from shadowpuppet.pipeline.options import make_options
-from shadowpuppet.pipeline.track import fit_person
+from shadowpuppet.pipeline.prepare import fit_person
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD, PAGE, ASSETS = ROOT / "build", ROOT / "docs" / "ablations.md", ROOT / "docs" / "assets"

@@ -25,10 +25,11 @@ from rich.table import Table
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage, chosen_views, open_recording, take_sample
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.prepare import kind_of
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
-from shadowpuppet.pipeline.track import kind_of, run
+from shadowpuppet.pipeline.track import run
 from shadowpuppet.silhouette import ready_mask
 
 Mask = NDArray[np.bool_]

@@ -25,10 +25,10 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.options import Options, make_options, plain_options
 from shadowpuppet.pipeline.person import MonocularSubject
+from shadowpuppet.pipeline.prepare import MONOCULAR, prepare
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.synthesize import make_recording
-from shadowpuppet.pipeline.track import MONOCULAR, prepare
 from shadowpuppet.synthetic import Mannequin, Scene, Spec, Viewpoint, read_spec
 from shadowpuppet.synthetic.movement.gestures import LEAD_SECONDS
 from shadowpuppet.synthetic.spec_changes import parse_gestures

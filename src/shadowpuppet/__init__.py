@@ -33,8 +33,9 @@ if TYPE_CHECKING:
     from shadowpuppet.pipeline.footage import open_footage
     from shadowpuppet.pipeline.look import Look
     from shadowpuppet.pipeline.options import Options, make_options
+    from shadowpuppet.pipeline.prepare import look_at
     from shadowpuppet.pipeline.silhouettes import read_masks
-    from shadowpuppet.pipeline.track import Listener, look_at, track_recording
+    from shadowpuppet.pipeline.track import Listener, track_recording
     from shadowpuppet.silhouette import SilhouetteSettings, learn_background
     from shadowpuppet.synthetic import synthesize
     from shadowpuppet.tracking.monocular.initialization import find_person, fit_references
@@ -54,7 +55,7 @@ _HOMES = {
     "read_joints": "io.motion.table", "write_joints": "io.motion.table", "Person": "io.person", "read_person": "io.person",
     "write_person": "io.person", "Recording": "io.recording", "read_recording": "io.recording", "Run": "io.run", "read_run": "io.run",
     "Look": "pipeline.look", "evaluate": "motion.metrics", "JointTable": "motion.motion", "Motion": "motion.motion",
-    "Options": "pipeline.options", "make_options": "pipeline.options", "Listener": "pipeline.track", "look_at": "pipeline.track",
+    "Options": "pipeline.options", "make_options": "pipeline.options", "Listener": "pipeline.track", "look_at": "pipeline.prepare",
     "track_recording": "pipeline.track", "Picture": "camera.rasterize", "MonocularSettings": "tracking.monocular.settings",
     "make_settings": "tracking.monocular.settings", "SilhouetteSettings": "silhouette", "learn_background": "silhouette",
     "synthesize": "synthetic", "MonocularTracker": "tracking.monocular.tracker", "open_frames": "video", "write_frames": "video",

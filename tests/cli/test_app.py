@@ -473,7 +473,7 @@ def test_control_c_and_the_like_leave_a_run_that_can_be_read_and_goes_on(recordi
 
 def test_an_earlier_run_is_replaced_only_if_asked_to(shell, recording, run, monkeypatch, tmp_path):
     shutil.copytree(run, tmp_path / "run")
-    monkeypatch.setattr("shadowpuppet.pipeline.track.prepare", lambda *_: pytest.fail("it was begun"))
+    monkeypatch.setattr("shadowpuppet.pipeline.track.look_around", lambda *_: pytest.fail("it was begun"))
     said = "run: found a complete run, expected --force, which replaces it, or another folder"
     assert said in refused(shell, "track", recording, "-o", "run")
     info = tmp_path / "run" / "run.toml"
@@ -497,7 +497,7 @@ def test_an_earlier_run_is_replaced_only_if_asked_to(shell, recording, run, monk
 
 def test_a_run_that_is_complete_needs_not_go_on(shell, recording, run, monkeypatch, tmp_path):
     shutil.copytree(run, tmp_path / "run")
-    monkeypatch.setattr("shadowpuppet.pipeline.track.prepare", lambda *_: pytest.fail("it was begun"))
+    monkeypatch.setattr("shadowpuppet.pipeline.track.look_around", lambda *_: pytest.fail("it was begun"))
     code, out, err = shell("track", recording, "-o", "run", "--resume", "--overlay", *QUICK)
     assert (code, err) == (0, "run: the run is complete: nothing is left to be done\n")
     assert "frames/s" in out

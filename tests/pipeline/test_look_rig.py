@@ -18,10 +18,11 @@ from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.pipeline.look import RigLook
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.prepare import MULTIVIEW, look_at, prepare
 from shadowpuppet.pipeline.progress import Listener, json_text
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.survey.rig import survey_rig
-from shadowpuppet.pipeline.track import MULTIVIEW, look_at, prepare, track_recording
+from shadowpuppet.pipeline.track import track_recording
 
 MASKS = Options(masks=True)
 

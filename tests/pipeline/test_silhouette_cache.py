@@ -9,9 +9,10 @@ from follower import followed
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.prepare import MULTIVIEW
 from shadowpuppet.pipeline.rig import FrameSet, open_rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
-from shadowpuppet.pipeline.track import MULTIVIEW, Listener, run, track_recording
+from shadowpuppet.pipeline.track import Listener, run, track_recording
 
 QUICK = {"tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
 

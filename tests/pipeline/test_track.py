@@ -20,9 +20,10 @@ from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.metrics import jitter, overlap
 from shadowpuppet.pipeline.footage import RUN, RUNS, CameraFrame, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options, plain_options, read_options
+from shadowpuppet.pipeline.prepare import fit_person, look_at
 from shadowpuppet.pipeline.progress import StageTimer
 from shadowpuppet.pipeline.silhouettes import learn_silhouettes, read_masks
-from shadowpuppet.pipeline.track import Listener, fit_person, json_text, look_at, track_recording
+from shadowpuppet.pipeline.track import Listener, json_text, track_recording
 from shadowpuppet.video import open_frames
 
 JOINTS = {"pelvis", "neck", "head", *(f"{side}_{joint}" for side in ("left", "right") for joint in ("shoulder", "elbow", "wrist", "hand"))}

@@ -18,9 +18,10 @@ from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.limbs import LIMBS
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
+from shadowpuppet.pipeline.prepare import MULTIVIEW, look_at
 from shadowpuppet.pipeline.progress import STAGES, Listener
 from shadowpuppet.pipeline.rig import open_rig, read_frames
-from shadowpuppet.pipeline.track import MULTIVIEW, look_at, run
+from shadowpuppet.pipeline.track import run
 from shadowpuppet.video import open_frames
 
 made_of = []

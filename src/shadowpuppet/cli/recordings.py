@@ -76,7 +76,7 @@ def info(recording: Annotated[Path, Parameter(help="Folder of a recording, film,
         return explain_motion(recording, as_json)
     calibration.refuse_other_files(recording)
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.pipeline.track import look_at
+    from shadowpuppet.pipeline.prepare import look_at
 
     with terminal(quiet=as_json, verbose=verbose) as listener:
         look = look_at(recording, options_from(flags, config), listener)

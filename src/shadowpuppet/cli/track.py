@@ -239,7 +239,7 @@ def fit_person(recording: Recording, /, *, file: Annotated[Path, output("File th
     sizes."""
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.person import MonocularSubject
-    from shadowpuppet.pipeline.track import fit_person
+    from shadowpuppet.pipeline.prepare import fit_person
 
     with terminal(quiet) as listener:
         listener.begin("looking")

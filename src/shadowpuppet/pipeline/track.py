@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import time
 from array import array
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,18 +13,15 @@ import numpy as np
 
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError, warn
 from shadowpuppet.io.people import person_folder
-from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter, write_metrics
 from shadowpuppet.motion.motion import BLANK, Motion, MotionFrame
-from shadowpuppet.pipeline.look import Look, RigLook, Survey
+from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
-from shadowpuppet.pipeline.person import fit_monocular
-from shadowpuppet.pipeline.person_rig import fit_multiview
+from shadowpuppet.pipeline.prepare import Kind, Prepared, fit_survey, kind_of, look_around
 from shadowpuppet.pipeline.progress import (
     FALLBACK_RATE,
-    STAGES,
     LeftOut,
     Listener,
     StageTimer,
@@ -47,82 +43,17 @@ from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig, read_frames
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, floor_entry, joint_names, motion_frame
-from shadowpuppet.pipeline.survey.camera import survey_camera
-from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
-from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.tracking.smoothing.butterworth import check_cutoff
 from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother, smoothed_parts
 from shadowpuppet.video import write_frames
 
-__all__ = ["Listener", "Summary", "fit_person", "json_text", "look_at", "track_recording"]
+__all__ = ["Listener", "Summary", "json_text", "track_recording"]
 
-
-LOOKS_AGAIN = 3
-"""Greatest number of times that a recording is surveyed again because of what the fitted body leaves unexplained."""
 CHECKPOINT_SECONDS, CHECKPOINT_COST = 1.0, 50.0
 """Least time from one checkpoint to the next: in seconds, and over the time that it takes to write one."""
-
-
-class Kind(NamedTuple):
-    """How a recording is surveyed, fitted and tracked: with one camera or with several."""
-
-    method: str
-    """Name of the method; {} stands for the number of cameras."""
-    settings: str
-    """Name of the field of `Options` with the tracker's settings."""
-    survey: Callable[..., Survey]
-    """Examines a rig with options and, after a first fit, with a `SceneHint` for each camera."""
-    fit: Callable[[np.random.Generator, Survey, Options], TrackedSubject]
-    """Measures the person and makes the tracker."""
-    look_fits: bool
-    """Whether `look_at` also measures the person; not with several cameras, which takes long."""
-    stages: tuple[str, ...]
-    """Stages whose times are written to metrics.json."""
-
-
-MONOCULAR = Kind("Liu 2011, one camera", "tracker", survey_camera, fit_monocular, True, ("decode", "segment", "track", "doubt", "write"))
-MULTIVIEW = Kind("Ni 2008, {} cameras", "multiview", survey_rig, fit_multiview, False, STAGES)
-
-
-class Prepared(NamedTuple):
-    """The surveyed recording and the fitted person, before tracking."""
-
-    survey: Survey
-    subject: TrackedSubject | None
-    """The fitted person; None if tracking is hopeless."""
-    look: Look | RigLook
-
-    def check(self) -> TrackedSubject:
-        """The fitted person. Raises `TrackingError` if tracking is hopeless."""
-        if self.subject is None:
-            raise TrackingError(f"{self.look.recording}: {self.look.refusal}; --anyway tries it")
-        return self.subject
-
-
-@one_blas_thread()
-def look_at(recording: str | Path, options: Options | None = None, listener: Listener | None = None) -> Look | RigLook:
-    """Examine a recording as `track_recording` does before tracking. Raises a `ShadowPuppetError` if something cannot be used."""
-    options = options or Options()
-    rig = open_rig(recording, options)
-    kind = kind_of(rig)
-    if kind.look_fits:
-        return prepare(generators(options)[0], rig, options, kind, listener=listener).look
-    return kind.survey(rig, options, listener=listener).look
-
-
-@one_blas_thread()
-def fit_person(recording: str | Path, file: str | Path, options: Options | None = None,
-               listener: Listener | None = None) -> tuple[TrackedSubject, Look | RigLook]:
-    """Measure the person and save the sizes. Raises a `ShadowPuppetError` if no person is found or the file cannot be written."""
-    options = options or Options()
-    rig = open_rig(recording, options)
-    prepared = prepare(generators(options)[0], rig, options, kind_of(rig), listener=listener)
-    subject = prepared.check()
-    write_person(file, subject.person)
-    return subject, prepared.look
 
 
 @one_blas_thread()
@@ -144,55 +75,6 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
     return run(rig, kind_of(rig), folder, options, listener or Listener(), cache, resume=resume)
 
 
-def kind_of(rig: Rig) -> Kind:
-    """`MONOCULAR` or `MULTIVIEW`, by the number of cameras."""
-    return MULTIVIEW if rig.is_multiview else MONOCULAR
-
-
-def look_around(rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None, listener: Listener | None = None) -> Survey:
-    """Survey a recording. Raises a `ShadowPuppetError` if something cannot be used."""
-    survey = partial(kind.survey, listener=listener)
-    return survey(rig, options) if cache is None else cache.survey(rig, options, survey)
-
-
-def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None,
-            listener: Listener | None = None) -> Prepared:
-    """Survey a recording, and fit the person unless tracking is hopeless. Raises a `ShadowPuppetError` if something cannot be used."""
-    return _fitted(rng, look_around(rig, options, kind, cache, listener), options, kind, cache, listener or Listener())
-
-
-def _fitted(rng: np.random.Generator, survey: Survey, options: Options, kind: Kind, cache: SilhouetteCache | None,
-            listener: Listener) -> Prepared:
-    """The surveyed recording and the person in it."""
-    if survey.look.refusal is not None and not options.anyway:
-        return Prepared(survey, None, survey.look)
-    listener.begin("measuring the person")
-    try:
-        subject = kind.fit(rng, survey, options)
-    except TrackingError:
-        listener.look(survey.look)  # which may say why
-        raise
-    for _ in range(LOOKS_AGAIN):
-        again = _looked_again(survey, subject, options, kind, listener)
-        if again is None:
-            break
-        listener.begin("measuring the person again: what belongs to the scene is left out now")
-        survey, subject = again, kind.fit(rng, again, options)
-        if cache is not None:
-            cache.keep(survey)
-    return Prepared(survey, subject, survey.look_with(subject.summary, subject.doubts))
-
-
-def _looked_again(survey: Survey, subject: TrackedSubject, options: Options, kind: Kind, listener: Listener) -> Survey | None:
-    """The survey in which what never moves, and the fitted body leaves unexplained, belongs to the scene; None if there is nothing."""
-    if all(each is None for each in subject.beside):
-        return None
-    hints = tuple(SceneHint(beside, each.added) for beside, each in zip(subject.beside, survey.silhouettes, strict=True))
-    again = kind.survey(survey.rig, options, hints, listener)
-    more = any(new.added is not old.added for new, old in zip(again.silhouettes, survey.silhouettes))
-    return again if more and again.look.refusal is None else None
-
-
 def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Listener, cache: SilhouetteCache | None = None,
         resume: bool = False) -> Summary:
     """Survey, fit, track and evaluate; see `track_recording`."""
@@ -206,7 +88,7 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         survey = look_around(rig, options, kind, cache, listener)
         if survey.several and (survey.look.refusal is None or options.anyway):
             return _run_people(writer, survey, options, listener, (for_look, for_track), resume)
-        prepared = _fitted(for_look, survey, options, kind, cache, listener)
+        prepared = fit_survey(for_look, survey, options, kind, cache, listener)
         writer.metrics |= {"kept_silhouettes": True} if cache is not None and cache.is_complete(options) else {}
         writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)

@@ -10,7 +10,7 @@ from silhouette_scenes import SIZE, empty_shots, grey, overlap, scene, shot
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette import learn_background, recover_scene
 from shadowpuppet.silhouette.recovery.head import missing_head
-from shadowpuppet.silhouette.recovery.scene import _persons_parts
+from shadowpuppet.silhouette.recovery.separation import _persons_parts
 
 TRUNK, LEGS, SKIN, POSTER = (120, 45, 40), (30, 32, 30), (90, 120, 190), (40, 200, 90)
 
