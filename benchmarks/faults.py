@@ -1,10 +1,11 @@
 """What faults of the pictures do to the joints, and whether they are noticed: a fixed set of faults on made films, for docs/faults.md.
 
-    python benchmarks/faults.py [--rows "crf 32;nudged by 5 pixels"] [--cameras one|several|both] [--workers 2] [--markdown FILE]
+    python benchmarks/faults.py [--rows "crf 32;nudged by 5 pixels"] [--cameras one|several|both] [--seeds 1] [--markdown FILE]
 
 `fault_rows.py` has films and faults. The films are made where they are missing, or of another spec, in build/faults (--again: all of them);
-each is tracked as `shadowpuppet track` does it, always with this code. A row's figures are over all its films. Frames in which the
-person cannot be seen by any camera are in no error; a frame without joints counts 500 mm for each. Without films 10 minutes on two cores.
+each is tracked as `shadowpuppet track` does it, always with this code, with several seeds: a film with one camera may be off by half more
+with one seed than with the next. A row's figures are over all its films and seeds. Frames in which the person cannot be seen by any
+camera are in no error; a frame without joints counts 500 mm for each. Without films half an hour on two cores.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import os
 import re
 import shutil
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from itertools import groupby
@@ -52,6 +54,8 @@ WRONG = 2.0
 SURE = 3
 """Number of good frames after which a person is recovered."""
 ONE_CAMERA, FOUR_CAMERAS = "one camera", "four cameras"
+SEEDS = {ONE_CAMERA: 5, FOUR_CAMERAS: 3}
+"""Number of runs of each film, with the seeds 0, 1, ..."""
 
 
 class Measures(NamedTuple):
@@ -95,17 +99,23 @@ def made(film: Spec, row: Row, folder: Path, again: bool) -> Path:
     return path
 
 
-def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
-    """Track the film with the fault, and compare it with the truth."""
+def measured(film: Spec, row: Row, folder: Path, again: bool, seeds: int) -> list[Measures]:
+    """Track the film with the fault, with each seed, and compare it with the truth."""
     path = made(film, row, folder, again)
     exact = _exact_masks(path)
     truth, seen = read_truth(path / "truth.csv"), _seen(exact)
     if any(KINDS[fault.kind].displacement for fault in row.of(film).faults):  # silhouettes belong where the calibrated camera sees them
         exact = _exact_masks(made(film, ONE[0], folder, False))
+    return [_measured(path, seed, truth, seen, exact, film.rate) for seed in range(seeds)]
+
+
+def _measured(path: Path, seed: int, truth: JointTable, seen: Sequence[bool], exact: Sequence[Sequence[np.ndarray]],
+              rate: float) -> Measures:
+    """One run of a film. seen: whether a camera sees the person, by frame."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            cache, options = SilhouetteCache(), make_options({})
+            cache, options = SilhouetteCache(), make_options({"seed": seed})
             run = track_recording(path, path / "run", options, cache=cache)
             motion, metrics = _nearest(path / "run", run, truth)
     except ShadowPuppetError as error:
@@ -113,17 +123,16 @@ def measured(film: Spec, row: Row, folder: Path, again: bool) -> Measures:
         return Measures(truth.times, np.where(_upto(seen, count), LOST_ERROR, np.nan), np.full(count, np.nan), np.full(count, "lost"),
                         np.zeros(count, bool), np.zeros((count, 5)), np.full(count, np.nan), ("",) * count, str(error))
     mean, worst, judged = _errors(motion, truth)
-    seen = _upto(seen, len(motion))
-    mean, worst, judged = np.where(seen, mean, np.nan), np.where(seen, worst, np.nan), judged * seen[:, None]
+    shown = _upto(seen, len(motion))
+    mean, worst, judged = np.where(shown, mean, np.nan), np.where(shown, worst, np.nan), judged * shown[:, None]
     alike = np.full(len(motion), np.nan)
     for frames in cache.frames((one for one in ()), options):
-        n = int(np.abs(motion.times - frames.time).argmin())
-        values = [overlap(mask, own[round(frames.time * film.rate)]) for mask, own in zip(frames.masks, exact)
-                  if mask is not None and round(frames.time * film.rate) < len(own)]
+        n, at = int(np.abs(motion.times - frames.time).argmin()), round(frames.time * rate)
+        values = [overlap(mask, own[at]) for mask, own in zip(frames.masks, exact) if mask is not None and at < len(own)]
         alike[n] = np.nanmean(values) if np.isfinite(values).any() else np.nan
     shutil.rmtree(path / "run")
     vouched = (motion.limb_status == "tracked").any(1)
-    return Measures(motion.times, mean, worst, motion.status, vouched, judged, np.where(seen, alike, np.nan),
+    return Measures(motion.times, mean, worst, motion.status, vouched, judged, np.where(shown, alike, np.nan),
                     _aside(run, motion), verdict=metrics["verdict"]["word"], expected=expected_error(motion))
 
 
@@ -174,7 +183,7 @@ def _upto(seen: Sequence[bool], count: int) -> np.ndarray:
 
 
 class Figures(NamedTuple):
-    """A row of a table: of each film the measures with the fault and of the clean one."""
+    """A row of a table: of each film and seed the measures with the fault and of the clean one."""
 
     row: Row
     runs: list[tuple[Measures, Measures]]
@@ -213,9 +222,9 @@ class Figures(NamedTuple):
         return f"{np.nanmean(ours):.3f} ({np.nanmean(plain):.3f})" if self.row.name != CLEAN else f"{np.nanmean(ours):.3f}"
 
     def status(self) -> str:
-        """Number of frames in the fault by status."""
+        """Per cent of the frames in the fault by status."""
         status = self.pooled(1, lambda one: one.status)
-        return "/".join(str(int((status == name).sum())) for name in ("tracked", "uncertain", "lost", "absent"))
+        return "/".join(f"{100 * (status == name).mean():.0f}" for name in ("tracked", "uncertain", "lost", "absent"))
 
     def judged(self) -> list[str]:
         """In and after the fault, in per cent: joints far off, those of them that are vouched for, of all joints; and doubtful ones of
@@ -253,12 +262,13 @@ class Figures(NamedTuple):
     def line(self) -> str:
         """The row as Markdown."""
         name = self.row.name + (" (refused)" if any(one.refused for one, _ in self.runs) else "")
+        verdicts = Counter(one.verdict for one, _ in self.runs)
         cells = [name, *(self.error(part) for part in range(3)), self.masks(), self.status(), *self.judged(), self.noticed(),
-                 self.recovered(), "/".join(one.verdict for one, _ in self.runs)]
+                 self.recovered(), ", ".join(f"{word} {verdicts[word]}" for word in ("good", "doubtful", "bad") if verdicts[word])]
         return "| " + " | ".join(cells) + " |"
 
     def verdicts(self) -> Iterator[tuple[bool, bool]]:
-        """For each film whether its error is over twice the clean film's, and whether the run is called bad."""
+        """For each run whether its error is over twice the clean film's with the same seed, and whether it is called bad."""
         for one, plain in self.runs:
             shared = min(len(one.mean), len(plain.mean))
             known = np.isfinite(one.mean[:shared]) & np.isfinite(plain.mean[:shared])
@@ -269,27 +279,27 @@ HEAD = """| fault | before | in | after | masks | tracked/uncertain/lost/absent 
 |---|---|---|---|---|---|---|---|---|---|---|---|"""
 
 
-def summed_up(films: Iterable[tuple[bool, bool]]) -> str:
-    """The verdicts of a table's films, in a sentence."""
-    told = list(films)
+def summed_up(runs: Iterable[tuple[bool, bool]]) -> str:
+    """The verdicts of a table's runs, in a sentence."""
+    told = list(runs)
     wrong, right = [bad for off, bad in told if off], [bad for off, bad in told if not off]
-    return (f"Of {len(wrong)} films with over {WRONG:g} times the clean film's error {sum(wrong)} are called bad, of the {len(right)} "
+    return (f"Of {len(wrong)} runs with over {WRONG:g} times the clean film's error {sum(wrong)} are called bad, of the {len(right)} "
             f"others {sum(right)}.")
 
 
-def tables(jobs: Sequence[tuple[str, Spec, Row]], folder: Path, workers: int, again: bool) -> Iterator[tuple[str, Figures]]:
-    """The rows of all tables by its name, in order, each as soon as it is measured."""
+def tables(jobs: Sequence[tuple[str, Spec, Row]], folder: Path, workers: int, again: bool,
+           seeds: int | None = None) -> Iterator[tuple[str, Figures]]:
+    """The rows of all tables by its name, in order, each as soon as it is measured. seeds: runs of each film; `SEEDS` if left out."""
     os.environ |= ONE_THREAD_EACH
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         clean_films = list({film.name: film for _, film, _ in jobs}.values())
         list(pool.map(made, clean_films, *zip(*[(ONE[0], folder, again)] * len(clean_films))))  # before others need their masks
-        results = pool.map(measured, *zip(*[(film, row, folder, again) for _, film, row in jobs]))
-        clean: dict[str, Measures] = {}
+        results = pool.map(measured, *zip(*[(film, row, folder, again, seeds or SEEDS[table]) for table, film, row in jobs]))
+        clean: dict[str, list[Measures]] = {}
         for (table, row), some in groupby(zip(jobs, results), lambda one: (one[0][0], one[0][2])):
-            runs = []
+            runs = list[tuple[Measures, Measures]]()
             for (_, film, _), found in some:
-                clean.setdefault(film.name, found)
-                runs.append((found, clean[film.name]))
+                runs += zip(found, clean.setdefault(film.name, found))
             yield table, Figures(row, runs)
 
 
@@ -322,8 +332,8 @@ def chosen(text: str, cameras: str, films: int, small: bool) -> list[tuple[str, 
 
 def _smallest(folder: Path) -> list[object]:
     page = smallest.copy(HERE.parents[1] / "docs" / "faults.md", folder)
-    return ["--rows", "gain 0.6 for 1.5 s;frozen for 1 s", "--cameras", "one", "--films", 1, "--small", "--workers", 1, "--folder", folder,
-            "--markdown", page]
+    return ["--rows", "gain 0.6 for 1.5 s;frozen for 1 s", "--cameras", "one", "--films", 1, "--seeds", 1, "--small", "--workers", 1,
+            "--folder", folder, "--markdown", page]
 
 
 def main() -> None:
@@ -332,6 +342,7 @@ def main() -> None:
     parser.add_argument("--rows", default="", help="names, with ; between them; all without")
     parser.add_argument("--cameras", choices=("one", "several", "both"), default="both")
     parser.add_argument("--films", type=int, default=9, help="so many of each at most")
+    parser.add_argument("--seeds", type=int, help="runs of each film (default: 5 with one camera, 3 with four)")
     parser.add_argument("--small", action="store_true", help="films of few and small pictures")
     parser.add_argument("--folder", type=Path, default=HERE, help="where the films are, or are made")
     parser.add_argument("--again", action="store_true", help="make all films again")
@@ -339,22 +350,22 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path, help="write the tables there too, at their places in docs/faults.md")
     parser.add_argument("--json", type=Path, help="write all frames' measures there")
     args = smallest.parse(parser, _smallest)
-    lines, films, everything = dict[str, list[str]](), dict[str, list[tuple[bool, bool]]](), []
+    lines, runs, everything = dict[str, list[str]](), dict[str, list[tuple[bool, bool]]](), []
     try:
         jobs = chosen(args.rows, args.cameras, args.films, args.small)
     except SettingsError as error:
         parser.error(str(error))
-    for table, figures in tables(jobs, args.folder, args.workers, args.again):
+    for table, figures in tables(jobs, args.folder, args.workers, args.again, args.seeds):
         if table not in lines:
             print(f"\n{table}\n\n{HEAD}", flush=True)
         lines.setdefault(table, [HEAD]).append(figures.line())
-        films.setdefault(table, []).extend(figures.verdicts())
+        runs.setdefault(table, []).extend(figures.verdicts())
         everything.append(_plain(table, figures))
         print(lines[table][-1], flush=True)
     for table, rows in lines.items():
-        print(f"{table}: {summed_up(films[table])}")
+        print(f"{table}: {summed_up(runs[table])}")
         if args.markdown:
-            into_page(args.markdown, table, "\n".join([*rows, "", summed_up(films[table])]))
+            into_page(args.markdown, table, "\n".join([*rows, "", summed_up(runs[table])]))
     if args.json:
         args.json.write_text(json.dumps(everything) + "\n", encoding="utf-8")
 
