@@ -137,6 +137,7 @@ def _calibrations(folder: Path, made: list[Camera]) -> None:
         file = next(path.iterdir()) if path.is_dir() and name not in ("easy", "colmap") else path
         if file.is_file():
             (folder / "calibration" / file.name).write_bytes(file.read_bytes())
+    (folder / "calibration" / "rough.toml").write_text("[a]\nat = [3, 0, 1.5]\ntoward = [0, 0, 1]\nfov = 65\nsize = [640, 480]\n")
     for name in ("intri.yml", "extri.yml"):
         (folder / "pair" / name).write_bytes((folder / "easy" / name).read_bytes())
     (folder / "board" / "board.toml").write_text(board_text(board_from("charuco 7x5", 0.04)))

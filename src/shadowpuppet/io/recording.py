@@ -230,8 +230,9 @@ def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration
         told = {key: notes.choice(key, known) for key, known in (("unit", UNITS), ("up", UPS))} if notes else {}
         return read_calibration(calibration, sizes=size, **told)
     if len(films) > 1:
-        raise RecordingError(f"{folder}: no calibration.toml for its {len(films)} cameras ({choices(films)}); several "
-                             "cameras must be calibrated together")
+        raise RecordingError(f"{folder}: no calibration.toml for its {len(films)} cameras ({choices(films)}); several cameras must be "
+                             "calibrated together: by a board (`shadowpuppet calibrate LAB`), or by the person who walks there, from a "
+                             f"rough.toml that says where they stand (`shadowpuppet calibrate {folder} --from-person`)")
     if fov is None:
         raise RecordingError(f"{folder}: no calibration: give the camera's horizontal field of view (--fov DEGREES, option fov; a "
                              "phone held across has about 65, held upright 40, a webcam 60) or a calibration.toml")

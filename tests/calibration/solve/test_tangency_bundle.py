@@ -52,6 +52,24 @@ def fits(true, rows):
     return [(start, place_by_outlines(start, rows)) for start in starts]
 
 
+def test_focal_lengths_come_back_with_the_places(true, rows):
+    rng = np.random.default_rng(6)
+    factors = [1.04, 0.97, 0.96, 1.02]
+    start = [replace(camera, matrix=camera.matrix * [factor, factor, 1])
+             for camera, factor in zip(rough(true, rng, 3.0, 0.1), factors)]
+    kept, fit = place_by_outlines(start, rows), place_by_outlines(start, rows, rough_focal=0.05)
+    assert errors(fit.cameras, true)[0].mean() < 0.5 * errors(kept.cameras, true)[0].mean()
+    assert np.nanmax(fit.after) < 0.9 * np.nanmax(kept.after)
+    found, exact = (np.array([camera.matrix[0, 0] for camera in cameras]) for cameras in (fit.cameras, true))
+    assert np.abs(found / exact - 1).max() < 0.02
+    assert (np.abs(found / exact - 1) < 6 * fit.focal_sd).all()
+    for camera, before in zip(fit.cameras, start):
+        np.testing.assert_array_equal(camera.matrix[:2, 2], before.matrix[:2, 2])  # the principal point stays
+    assert not kept.focal_sd.any()
+    for camera, before in zip(kept.cameras, start):
+        np.testing.assert_array_equal(camera.matrix, before.matrix)
+
+
 @pytest.mark.parametrize("which", [0, 1])
 def test_cameras_come_back_from_rough_places(true, rows, fits, which):
     start, fit = fits[which]

@@ -112,6 +112,30 @@ def test_the_command_shows_what_it_did(lab, tmp_path, capsys):
     assert len(read_calibration(tmp_path / "new.toml")) == len(lab[1])
 
 
+def test_a_recording_without_calibration_is_placed_from_rough_toml(lab, tmp_path, capsys):
+    folder, exact = shutil.copytree(lab[0], tmp_path / "lab"), lab[1]
+    (folder / "calibration.toml").unlink()
+    command = ["calibrate", str(folder), "--from-person", "--masks", "--height", str(TALL)]
+    assert run(command) == 2
+    assert "from a rough.toml that says where they stand" in capsys.readouterr().err
+    lines = []
+    for camera in exact:
+        ahead = camera.centre + 3 * camera.T_camera_world[2, :3] + np.array([0.1, 0, 0])
+        at, toward = (", ".join(f"{value:.2f}" for value in point) for point in (camera.centre + np.array([0, 0.1, 0.05]), ahead))
+        degrees = np.degrees(2 * np.arctan(camera.size[0] / 2 / camera.matrix[0, 0]))
+        lines.append(f"[{camera.name}]\nat = [{at}]\ntoward = [{toward}]\nfov = {degrees:.2f}\n")
+    (folder / "rough.toml").write_text("".join(lines))
+    assert run(command) in (0, 1)
+    assert "field of view" in capsys.readouterr().out
+    found = read_calibration(folder / "calibration.toml")
+    for a, b in ((0, 1), (0, 2), (1, 3)):
+        apart, true = (np.linalg.norm(cameras[a].centre - cameras[b].centre) for cameras in (found, exact))
+        assert apart == pytest.approx(true, rel=0.05)
+    for camera, true in zip(found, exact):
+        assert camera.matrix[0, 0] == pytest.approx(true.matrix[0, 0], rel=0.05)
+        assert abs(camera.matrix[0, 0] / true.matrix[0, 0] - 1) > 1e-5  # it was solved, not copied
+
+
 def test_a_single_camera_is_refused(lab):
     options = make_options({"masks": True})
     rig = open_rig(lab[0], options)

@@ -24,6 +24,8 @@ from shadowpuppet.threads import one_blas_thread
 
 ROUGH_ANGLE, ROUGH_PLACE = np.radians(10.0), 0.5
 """Standard deviations of a rough calibration's directions (rad) and places (m) along each axis."""
+ROUGH_FOCAL = 0.05
+"""Standard deviation of the logarithm of a focal length that follows from a field of view as stated by a maker."""
 LOSS_SCALES = (16.0, 4.0, 1.5)
 """Scales (pixels of a picture 1000 wide) of the soft L1 loss, one after another: first all tangents count, then those of a limb that a
 silhouette lacks less and less."""
@@ -34,7 +36,9 @@ LEAST_TANGENTS = 30
 STEPS, LEAST_GAIN = 40, 1e-6
 """Greatest number of steps with each loss, and the relative decrease that ends them."""
 NUDGE = 1e-5
-"""Difference of the numeric derivatives, rad and m."""
+"""Difference of the numeric derivatives, rad, m and share of the focal length."""
+TURN, MOVE, FOCAL, PARAMETERS = slice(0, 3), slice(3, 6), 6, 7
+"""A camera's increments: a rotation vector and a displacement along its axes, rad and m, and the logarithm of its focal length's factor."""
 BLOCKS = 20
 """Number of parts of the film whose disagreement tells the standard deviations."""
 
@@ -52,6 +56,8 @@ class TangencyFit:
     """Standard deviations of the cameras' centres within the rig, of shape (C,), metres: root of the trace."""
     angle_sd: Array
     """The same of their directions, of shape (C,), radians."""
+    focal_sd: Array
+    """The same of their focal lengths, relative, of shape (C,); 0 where they were given."""
     tangents: int
     """Number of pairs of tangents compared."""
     far: float
@@ -66,7 +72,7 @@ class _Hulls(NamedTuple):
     firm: NDArray[np.bool_]
     """Whether each lies far from the picture's border, of shape (F, K); none of a silhouette that is missing."""
     focal: float
-    """Pixels per radian near the middle."""
+    """Pixels per radian near the middle, of the lens that `rays` belong to."""
 
 
 class _Pair(NamedTuple):
@@ -78,11 +84,12 @@ class _Pair(NamedTuple):
 
 @one_blas_thread()
 def place_by_outlines(cameras: Sequence[Camera], rows: Sequence[Row], free: Sequence[int] | None = None, *,
-                      rough: tuple[float, float] = (ROUGH_ANGLE, ROUGH_PLACE)) -> TangencyFit:
+                      rough: tuple[float, float] = (ROUGH_ANGLE, ROUGH_PLACE), rough_focal: float = 0.0) -> TangencyFit:
     """The cameras whose tangents agree best in sets of silhouettes.
 
     free: indices of the cameras that may move, by default all. rough: standard deviations of the given directions (rad) and places (m).
-    Lenses stay as they are. Raises `CalibrationError` if a free camera has too few tangents in common with others.
+    rough_focal: that of the logarithm of the focal lengths; 0: lenses stay as they are. Raises `CalibrationError` if a free camera has too
+    few tangents in common with others.
     """
     free = range(len(cameras)) if free is None else free
     hulls = [_hulls(camera, [row[n] for row in rows]) for n, camera in enumerate(cameras)]
@@ -91,15 +98,16 @@ def place_by_outlines(cameras: Sequence[Camera], rows: Sequence[Row], free: Sequ
     found = [_distances(cameras, hulls, pair) for pair in pairs]
     _check(cameras, pairs, found, free)
     size = max(max(camera.size) for camera in cameras) / 1000
-    value = np.zeros((len(cameras), 6))
+    value, deviations = np.zeros((len(cameras), PARAMETERS)), np.r_[np.repeat(rough, 3), rough_focal]
     for scale in LOSS_SCALES:
-        value = _minimised(cameras, hulls, pairs, value, free, scale * size, rough)
+        value = _minimised(cameras, hulls, pairs, value, free, scale * size, deviations)
     now = _moved(cameras, value)
     last = [_distances(now, hulls, pair) for pair in pairs]
-    place_sd, angle_sd = _deviations(now, hulls, pairs, last, free, LOSS_SCALES[-1] * size)
+    place_sd, angle_sd, focal_sd = _deviations(now, hulls, pairs, last, free, LOSS_SCALES[-1] * size, deviations)
     values = np.concatenate([each[np.isfinite(each)] for each in last])
     return TangencyFit(cameras=tuple(now), before=_medians(len(cameras), pairs, found), after=_medians(len(cameras), pairs, last),
-                       place_sd=place_sd, angle_sd=angle_sd, tangents=len(values), far=float((np.abs(values) > FAR_PIXELS * size).mean()))
+                       place_sd=place_sd, angle_sd=angle_sd, focal_sd=focal_sd, tangents=len(values),
+                       far=float((np.abs(values) > FAR_PIXELS * size).mean()))
 
 
 def _check(cameras: Sequence[Camera], pairs: Sequence[_Pair], found: Sequence[Array], free: Sequence[int]) -> None:
@@ -126,7 +134,19 @@ def _hulls(camera: Camera, silhouettes: Row) -> _Hulls:
     most = max((len(rays) for rays, _ in corners), default=1)
     pad = [(np.concatenate([rays, np.repeat(rays[-1:], most - len(rays), 0)]), np.r_[firm, np.repeat(firm[-1:], most - len(firm))])
            for rays, firm in corners]
-    return _Hulls(np.array([rays for rays, _ in pad]), np.array([firm for _, firm in pad]), float(np.diag(camera.matrix)[:2].mean()))
+    return _Hulls(np.array([rays for rays, _ in pad]), np.array([firm for _, firm in pad]), _focal(camera))
+
+
+def _focal(camera: Camera) -> float:
+    return float(np.diag(camera.matrix)[:2].mean())
+
+
+def _rays(camera: Camera, hulls: _Hulls, sets: NDArray[np.int64]) -> Array:
+    """Directions (P, K, 3) of some sets' hulls in the world, for the camera's own focal length."""
+    rays, factor = hulls.rays[sets], hulls.focal / _focal(camera)
+    if abs(factor - 1) > 1e-12:
+        rays = unit(rays * (factor, factor, 1))
+    return rays @ camera.T_camera_world[:3, :3]
 
 
 def _distances(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pair: _Pair) -> Array:
@@ -139,8 +159,7 @@ def _distances(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pair: _Pair) 
     if length < 1e-9:
         return out
     line = line / length
-    aside = [rays - (rays @ line)[..., None] * line
-             for rays in (hulls[n].rays[pair.sets] @ cameras[n].T_camera_world[:3, :3] for n in pair[:2])]
+    aside = [rays - (rays @ line)[..., None] * line for rays in (_rays(cameras[n], hulls[n], pair.sets) for n in pair[:2])]
     ahead = sum(unit(each.sum(1)) for each in aside)
     ahead = unit(np.where(np.linalg.norm(ahead, axis=1, keepdims=True) > 1e-6, ahead, aside[0].sum(1)))
     up, sets = np.cross(line, ahead), np.arange(len(out))
@@ -155,11 +174,11 @@ def _distances(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pair: _Pair) 
 
 
 def _minimised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], start: Array, free: Sequence[int],
-               scale: float, rough: tuple[float, float]) -> Array:
-    """Increments (C, 6) of the cameras, of least loss, by Levenberg's and Marquardt's method with reweighting."""
-    value, damping = start, 1e-3
-    prior = np.tile(np.repeat(1 / np.square(rough), 3), len(free))
-    places = [6 * n + k for n in free for k in range(6)]
+               scale: float, deviations: Array) -> Array:
+    """Increments (C, PARAMETERS) of the cameras, of least loss, by Levenberg's and Marquardt's method with reweighting. deviations:
+    (PARAMETERS,) of the prior; what has none stays."""
+    value, damping, places = start, 1e-3, _places(free, deviations)
+    prior = np.tile(1 / np.square(deviations[deviations > 0]), len(free))
     found = [_distances(_moved(cameras, value), hulls, pair) for pair in pairs]
     cost = _loss(found, scale) + float((prior * value.ravel()[places] ** 2).sum()) / 2
     for _ in range(STEPS):
@@ -182,6 +201,11 @@ def _minimised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequen
     return value
 
 
+def _places(free: Sequence[int], deviations: Array) -> list[int]:
+    """Which of all cameras' increments are solved for."""
+    return [PARAMETERS * n + k for n in free for k in np.flatnonzero(deviations).tolist()]
+
+
 def _loss(found: Sequence[Array], scale: float) -> float:
     """Soft L1 loss of distances, in units of one pixel's square. What cannot be compared costs as much as `scale`: else cameras would be
     placed where little can be."""
@@ -194,9 +218,9 @@ class _Linear(NamedTuple):
     """A pair's distances to first order."""
 
     columns: NDArray[np.int64]
-    """Of both cameras' increments, of shape (12,)."""
+    """Of both cameras' increments, of shape (2 PARAMETERS,)."""
     slopes: Array
-    """Of shape (12, K), for K known distances."""
+    """Of shape (2 PARAMETERS, K), for K known distances."""
     values: Array
     """Of shape (K,), pixels."""
     sets: NDArray[np.int64]
@@ -205,21 +229,21 @@ class _Linear(NamedTuple):
 
 def _linearised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], value: Array, found: Sequence[Array],
                 free: Sequence[int]) -> Iterator[_Linear]:
-    """The distances `found` at increments (C, 6) of pairs with a `free` camera and, by differences, their derivatives; 0 by the increments
-    of the others."""
+    """The distances `found` at increments (C, PARAMETERS) of pairs with a `free` camera and, by differences, their derivatives; 0 by the
+    increments of the others."""
     now = _moved(cameras, value)
-    nudged = {n: [_moved_one(cameras[n], value[n] + step) for step in np.eye(6) * NUDGE] for n in free}
+    nudged = {n: [_moved_one(cameras[n], value[n] + step) for step in np.eye(PARAMETERS) * NUDGE] for n in free}
     for pair, base in zip(pairs, found):
         moving = [(side, n) for side, n in enumerate(pair[:2]) if n in nudged]
         if not moving:
             continue
         known = np.isfinite(base)
-        slopes = np.zeros((12, known.sum()))
+        slopes = np.zeros((2 * PARAMETERS, known.sum()))
         for side, n in moving:
-            for k in range(6):
+            for k in range(PARAMETERS):
                 there = [*now[:n], nudged[n][k], *now[n + 1 :]]
-                slopes[6 * side + k] = np.nan_to_num((_distances(there, hulls, pair)[known] - base[known]) / NUDGE)
-        columns = np.r_[6 * pair.first + np.arange(6), 6 * pair.second + np.arange(6)]
+                slopes[PARAMETERS * side + k] = np.nan_to_num((_distances(there, hulls, pair)[known] - base[known]) / NUDGE)
+        columns = np.concatenate([PARAMETERS * n + np.arange(PARAMETERS) for n in pair[:2]])
         yield _Linear(columns, slopes, base[known], np.repeat(pair.sets[:, None], 2, 1)[known])
 
 
@@ -239,11 +263,12 @@ def _normal(parts: Iterable[_Linear], size: int, scale: float) -> tuple[Array, A
 
 
 def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], found: Sequence[Array],
-                free: Sequence[int], scale: float) -> tuple[Array, Array]:
-    """Standard deviations of centres (C,), m, and directions (C,), rad, from how much parts of the film would move them (a "sandwich" of
-    gradients by blocks of sets: neighbouring silhouettes err together). If all cameras are free, within the rig: not of what a motion or
-    a scale of the whole rig changes."""
-    parts, size = list(_linearised(cameras, hulls, pairs, np.zeros((len(cameras), 6)), found, free)), 6 * len(cameras)
+                free: Sequence[int], scale: float, deviations: Array) -> tuple[Array, Array, Array]:
+    """Standard deviations of centres (C,), m, directions (C,), rad, and focal lengths (C,), relative, from how much parts of the film
+    would move them (a "sandwich" of gradients by blocks of sets: neighbouring silhouettes err together). If all cameras are free, within
+    the rig: not of what a motion or a scale of the whole rig changes."""
+    size = PARAMETERS * len(cameras)
+    parts = list(_linearised(cameras, hulls, pairs, np.zeros((len(cameras), PARAMETERS)), found, free))
     H, _ = _normal(parts, size, scale)
     sets = max(int(pair.sets[-1]) for pair in pairs) + 1
     blocks = np.zeros((BLOCKS, size))
@@ -251,22 +276,23 @@ def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Seque
         pulls = part.slopes * _weights(part.values, scale) * part.values
         for k, column in enumerate(part.columns):
             blocks[:, column] += np.bincount(part.sets * BLOCKS // sets, pulls[k], BLOCKS)
-    places = [6 * n + k for n in free for k in range(6)]
-    basis = np.linalg.svd(_whole_rig(cameras).T)[2][7:].T if len(free) == len(cameras) else np.eye(len(places))
+    places = _places(free, deviations)
+    basis = np.linalg.svd(_whole_rig(cameras)[places].T)[2][7:].T if len(free) == len(cameras) else np.eye(len(places))
     spread = basis @ np.linalg.pinv(basis.T @ H[np.ix_(places, places)] @ basis, hermitian=True) @ basis.T @ blocks[:, places].T
     own = np.zeros(size)
     own[places] = (spread**2).sum(1) * BLOCKS / (BLOCKS - 1)
-    return np.sqrt(own.reshape(-1, 6)[:, 3:].sum(1)), np.sqrt(own.reshape(-1, 6)[:, :3].sum(1))
+    own = own.reshape(-1, PARAMETERS)
+    return np.sqrt(own[:, MOVE].sum(1)), np.sqrt(own[:, TURN].sum(1)), np.sqrt(own[:, FOCAL])
 
 
 def _whole_rig(cameras: Sequence[Camera]) -> Array:
-    """Increments (6 C, 7) of all cameras by which the rig turns, moves and grows as a whole."""
+    """Increments (PARAMETERS C, 7) of all cameras by which the rig turns, moves and grows as a whole."""
     columns = []
     for axis in np.eye(3):
         along = [camera.T_camera_world[:3, :3] @ axis for camera in cameras]
-        columns.append([np.r_[turn, -np.cross(turn, camera.T_camera_world[:3, 3])] for turn, camera in zip(along, cameras)])
-        columns.append([np.r_[np.zeros(3), move] for move in along])
-    columns.append([np.r_[np.zeros(3), camera.T_camera_world[:3, 3]] for camera in cameras])
+        columns.append([np.r_[turn, -np.cross(turn, camera.T_camera_world[:3, 3]), 0] for turn, camera in zip(along, cameras)])
+        columns.append([np.r_[np.zeros(3), move, 0] for move in along])
+    columns.append([np.r_[np.zeros(3), camera.T_camera_world[:3, 3], 0] for camera in cameras])
     return np.array([np.concatenate(each) for each in columns]).T
 
 
@@ -275,8 +301,10 @@ def _moved(cameras: Sequence[Camera], value: Array) -> list[Camera]:
 
 
 def _moved_one(camera: Camera, increment: Array) -> Camera:
-    """The camera turned about its centre by a rotation vector and then moved, both (3,) along its axes, rad and m."""
-    return replace(camera, T_camera_world=rigid(rotation_from_vector(increment[:3]), increment[3:]) @ camera.T_camera_world)
+    """The camera turned about its centre and then moved, its focal length changed, by increments (PARAMETERS,)."""
+    there = rigid(rotation_from_vector(increment[TURN]), increment[MOVE]) @ camera.T_camera_world
+    factor = float(np.exp(increment[FOCAL]))
+    return replace(camera, T_camera_world=there, matrix=camera.matrix * [factor, factor, 1] if factor != 1 else camera.matrix)
 
 
 def _medians(count: int, pairs: Sequence[_Pair], found: Sequence[Array]) -> Array:

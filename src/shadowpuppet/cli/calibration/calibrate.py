@@ -30,8 +30,9 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
               lenses: Annotated[Path | None, flag("A calibration whose lenses are kept; only places are solved.")] = None,
               to: Annotated[Path | None, output("Calibration to write; LAB/calibration.toml if not given. An old one is kept "
                                                 "as calibration.before1.toml.")] = None,
-              from_person: Annotated[Switch, Parameter(help="LAB is a recording of a person who walks, with a rough calibration: "
-                                                            "refine places by outlines, scale by the height, floor by the feet.")] = False,
+              from_person: Annotated[Switch, Parameter(help="LAB is a recording of a person who walks, with a rough "
+                                                            "calibration or rough.toml: refine places by outlines, scale by the "
+                                                            "height, floor by the feet.")] = False,
               height: Annotated[float | None, flag("With --from-person: the person's height in metres, with shoes on.")] = None,
               masks: Annotated[Switch, Parameter(help="With --from-person: use the recording's masks/.")] = False,
               print_board: Annotated[Path | None, flag("Write the board as a PDF of true size, and end.")] = None,
@@ -40,7 +41,8 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
     room before several, the floor from one that lies on it.
 
     Writes LAB/calibration.toml, and LAB/calibration.html with errors, coverage, places, and what to film again. Exit code 1 if something
-    should be filmed again. With --from-person no board is needed: lenses are those of the rough calibration.
+    should be filmed again. With --from-person no board is needed: lenses are those of the rough calibration; fields of
+    view in rough.toml are refined.
     """
     if print_board is not None:
         from shadowpuppet.calibration.boards.printing import write_board
@@ -87,13 +89,12 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
 def _from_person(recording: Path, height: float | None, masks: bool, to: Path | None) -> int:
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.options import make_options
-    from shadowpuppet.pipeline.repair.placing import place_cameras, write_placed
-    from shadowpuppet.pipeline.rig import open_rig
+    from shadowpuppet.pipeline.repair.placing import open_rough, place_cameras, write_placed
 
     options = make_options({"height": height, "masks": masks})
     with terminal() as listener:
-        rig = open_rig(recording, options)
-        placed = place_cameras(rig, options, listener)
+        rig, rough_focal = open_rough(recording, options)
+        placed = place_cameras(rig, options, listener, rough_focal)
         written = write_placed(rig, placed, to)
         listener.stop()
         show(placed_table(placed, rig.cameras), pairs([("written", "\n".join(map(str, written)))]))
@@ -109,11 +110,19 @@ def placed_table(placed: Placed, before: Sequence[Camera]) -> RenderableType:
         turned = np.degrees(np.linalg.norm(vector_from_rotation(camera.T_camera_world[:3, :3] @ old.T_camera_world[:3, :3].T)))
         rows.append((camera.name, f"{placed.fit.before[n]:.1f} px", f"{placed.fit.after[n]:.1f} px",
                      f"{1000 * np.linalg.norm(camera.centre - old.centre):.0f} mm", f"{turned:.1f}°",
-                     f"{1000 * placed.place_doubt[n]:.0f} mm, {np.degrees(placed.angle_doubt[n]):.2f}°"))
+                     f"{1000 * placed.place_doubt[n]:.0f} mm, {np.degrees(placed.angle_doubt[n]):.2f}°", *_field_of_view(placed, n)))
     what = (f"{placed.sets} sets of silhouettes, {placed.fit.tangents} pairs of tangents; lengths times {placed.scale:.3f}, floor "
             f"tilted by {np.degrees(placed.tilt):.1f}°")
-    columns = ("camera", "apart", "now", "moved", "turned", "within the rig to")
+    columns = ("camera", "apart", "now", "moved", "turned", "within the rig to", *(["field of view"] if placed.focal_doubt.any() else []))
     return Group(pairs([("compared", what)]), "", table("", columns, rows, right=(1, 2, 3, 4)))
+
+
+def _field_of_view(placed: Placed, n: int) -> Iterator[str]:
+    """A camera's field of view across its picture, and how well it is known; nothing if the lens was given."""
+    camera, doubt = placed.cameras[n], placed.focal_doubt[n]
+    if doubt:
+        half = np.arctan(camera.size[0] / 2 / camera.matrix[0, 0])
+        yield f"{np.degrees(2 * half):.1f}° ± {np.degrees(np.sin(2 * half) * doubt):.1f}°"
 
 
 def _board(lab: Path | None, board: str | None, square: float | None, dictionary: str | None) -> Board:

@@ -100,16 +100,20 @@ def _camera(draft: Draft, metres: float, sizes: Callable[[str], tuple[int, int] 
                                "metres; it is probably in millimetres: say so by unit = \"mm\" in recording.toml, or write it in metres, "
                                "with `shadowpuppet info FILE --unit mm --to NEW.toml`")
     size = draft.size or (sizes(draft.name) if sizes is not None else None) or _guessed(draft, notes)
+    matrix = Camera.from_fov((int(size[0]), int(size[1])), draft.fov).matrix if draft.fov is not None else np.asarray(draft.matrix)
     lens = np.ravel(np.asarray(draft.distortion, float))
     if not draft.fisheye:
         lens = lens[:8] if lens.size > 8 and not lens[8:].any() else lens
         lens = np.pad(lens, (0, 4 - lens.size)) if draft.where[:1] != "[" and 0 < lens.size < 4 else lens
     scaled = rigid(T[:3, :3], T[:3, 3] * metres)
-    return Camera(draft.name, (size[0], size[1]), np.asarray(draft.matrix), lens, scaled, draft.fisheye, draft.oriented)  # pyright: ignore[reportArgumentType]
+    return Camera(draft.name, (size[0], size[1]), matrix, lens, scaled, draft.fisheye, draft.oriented)  # pyright: ignore[reportArgumentType]
 
 
 def _guessed(draft: Draft, notes: list[str]) -> tuple[float, float]:
     """Guess the size (width, height) of a camera's pictures as twice the principal point, or the nearest of `SIZES`; adds a note."""
+    if draft.fov is not None:
+        raise CalibrationError("size: missing, expected the pictures' width and height in pixels, such as size = [1920, 1080]; in a "
+                               "recording the films tell it")
     twice = 2 * np.asarray(draft.matrix, float)[:2, 2] + 1
     if not (np.isfinite(twice).all() and (twice >= 2).all() and (twice < 1e5).all()):
         raise CalibrationError(f"found no picture size, and a principal point of {((twice - 1) / 2).tolist()}, expected one in the picture")

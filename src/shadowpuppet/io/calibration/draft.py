@@ -20,7 +20,7 @@ class Draft:
 
     name: str
     matrix: object
-    """Intrinsics, (3, 3), pixels."""
+    """Intrinsics, (3, 3), pixels; None where `fov` is stated."""
     distortion: object
     """Distortion coefficients in OpenCV's order."""
     T: Array | None
@@ -31,6 +31,8 @@ class Draft:
     oriented: bool = True
     where: str = ""
     """Prefix of messages about it, for example `[cam1]: `."""
+    fov: float | None = None
+    """Horizontal field of view, radians, of a lens that is known by that alone."""
 
 
 class Drafts(NamedTuple):

@@ -17,6 +17,7 @@ from shadowpuppet.io.calibration.number_blocks import read_biocv, read_krt
 from shadowpuppet.io.calibration.opencv import SUFFIXES, files_of, pair_of, read_opencv
 from shadowpuppet.io.calibration.pose2sim import read_tables
 from shadowpuppet.io.calibration.qualisys import read_qualisys
+from shadowpuppet.io.calibration.rough import is_rough, read_rough
 from shadowpuppet.io.calibration.vicon import read_vicon
 
 ENDINGS = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".cal", ".calib", ".krt", ".pickle", ".pkl")
@@ -54,12 +55,13 @@ OPENCV = Format("OpenCV (YAML, XML)",
 HUMANEVA = Format("HumanEva (.cal)", lambda path, text: _ends(path, ".cal"), read_bouguet)
 TABLES = Format("TOML (Pose2Sim, Anipose, FreeMoCap, Caliscope)",
                 lambda path, text: _ends(path, ".toml") or all(f"\n{key}" in f"\n{text}" for key in ("matrix", "distortions")), read_tables)
+ROUGH = Format("rough places (TOML with at, toward, fov)", lambda path, text: is_rough(text), read_rough)
 COLMAP = Format("COLMAP (cameras.txt, images.txt)", lambda path, text: is_colmap(path), read_colmap)
 JSON = Format("JSON", lambda path, text: _ends(path, ".json"), read_json)
 KALIBR = Format("Kalibr (camchain.yaml)", lambda path, text: CAMERA.search(text) is not None and "camera_model" in text, read_kalibr)
 BIOCV = Format("BioCV (.calib)", lambda path, text: _ends(path, ".calib"), read_biocv)
 KRT = Format("KRT", lambda path, text: path.stem.upper() == "KRT" or _ends(path, ".krt"), read_krt)
-FORMATS = (JSON, COLMAP, QUALISYS, VICON, EASYMOCAP, KALIBR, OPENCV, HUMANEVA, BIOCV, KRT, TABLES)
+FORMATS = (JSON, COLMAP, QUALISYS, VICON, EASYMOCAP, KALIBR, OPENCV, HUMANEVA, BIOCV, KRT, ROUGH, TABLES)
 """All formats, in the order in which they are tried."""
 
 
@@ -106,7 +108,8 @@ def is_calibration(path: Path) -> bool:
 
 
 def find_calibration(folder: Path) -> Path | None:
-    """The calibration in a recording folder, or in its folder `calibration`; None if there is none. calibration.toml is preferred.
+    """The calibration in a recording folder, or in its folder `calibration`; None if there is none, or only rough places. calibration.toml
+    is preferred.
 
     Raises `CalibrationError` if there are several.
     """
@@ -116,7 +119,7 @@ def find_calibration(folder: Path) -> Path | None:
         if not place.is_dir():
             continue
         files = [path for path in sorted(place.iterdir()) if path.is_file() and path.suffix.lower() in ENDINGS and path.name[0] != "."
-                 and path.name not in NO_CALIBRATIONS and is_calibration(path)]
+                 and path.name not in NO_CALIBRATIONS and is_calibration(path) and format_of(path) is not ROUGH]
         whole = {place if _in_pieces(path, files) else path for path in files}
         if len(whole) > 1:
             raise CalibrationError(f"{place}: found several calibrations ({choices(path.name for path in files)}); say in recording.toml "

@@ -92,7 +92,7 @@ def _draft(path: Path, title: str, table: dict[str, Any], name: object) -> Draft
                 raise CalibrationError(f"{key}: found {table[key]!r}, expected true or false")
         if missing:
             raise CalibrationError(f"{', '.join(missing)}: missing, expected {', '.join(FIELDS)}")
-        size, matrix = _numbers(table, "size", [(2,)]), _numbers(table, "matrix", [(3, 3)])
+        size, matrix = numbers_in(table, "size", [(2,)]), numbers_in(table, "matrix", [(3, 3)])
         T = rigid(_rotation(table), _flat(table, "translation", [(3,)]))
         return Draft(str(name), matrix, _flat(table, "distortions"), T, size.tolist(), table.get("fisheye", False),
                      table.get("oriented", True), f"[{title}]: ")
@@ -118,19 +118,20 @@ def _rotation(table: dict[str, Any]) -> Array:
 
 
 def _flat(table: dict[str, Any], key: str, shapes: list[tuple[int, ...]] | None = None) -> Array:
-    """As `_numbers`, but also accepts a nested row or column, as OpenCV returns them."""
+    """As `numbers_in`, but also accepts a nested row or column, as OpenCV returns them."""
     value = table[key]
     if isinstance(value, list) and len(value) == 1 and isinstance(value[0], list):
         value = value[0]
     elif isinstance(value, list) and value and all(isinstance(row, list) and len(row) == 1 for row in value):
         value = [row[0] for row in value]
-    return _numbers({key: value}, key, shapes)
+    return numbers_in({key: value}, key, shapes)
 
 
-def _numbers(table: dict[str, Any], key: str, shapes: list[tuple[int, ...]] | None = None) -> Array:
-    """A field's finite numbers, of one of `shapes`, or a vector of any length."""
+def numbers_in(table: dict[str, Any], key: str, shapes: list[tuple[int, ...]] | None = None) -> Array:
+    """A field's finite numbers, of one of `shapes`, or a vector of any length. Raises `CalibrationError`."""
     value = table[key]
     expected = " or ".join(" x ".join(map(str, s)) for s in shapes) + " finite numbers" if shapes else "a row of finite numbers"
+    expected = "a finite number" if shapes == [()] else expected
     try:
         array = np.array(value, float) if _is_numeric(value) else None
     except (ValueError, OverflowError):  # rows of unequal length, a whole number of 400 digits

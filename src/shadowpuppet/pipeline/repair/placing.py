@@ -11,7 +11,7 @@ import numpy as np
 
 from shadowpuppet.calibration.results import replace_calibration
 from shadowpuppet.calibration.silhouettes import Row
-from shadowpuppet.calibration.solve.tangency_bundle import TangencyFit, place_by_outlines
+from shadowpuppet.calibration.solve.tangency_bundle import ROUGH_FOCAL, TangencyFit, place_by_outlines
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, evenly_spread, inverse, rigid, rotation_from_vector, unit
@@ -19,7 +19,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.repair.check import gather_silhouettes
 from shadowpuppet.pipeline.repair.fix import write_notes
-from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 
 SETS = 90
@@ -39,6 +39,10 @@ DOUBT_FACTOR = 3.0
 """Factor on the fit's standard deviations: silhouettes err alike in all of a film, which it does not know."""
 MAX_PLACE_DOUBT, MAX_ANGLE_DOUBT = 0.02, np.radians(0.3)
 """Doubts about a camera's place, metres, and direction, rad, that are not remarked on."""
+MAX_FOCAL_DOUBT = 0.01
+"""Relative doubt about a focal length that is not remarked on."""
+ROUGH_NAME = "rough.toml"
+"""Name of a recording's file with rough places (`io.calibration.rough`), which counts before its calibration."""
 MANY_FAR = 0.15
 """Share of tangents that are far apart (`TangencyFit.far`) that is remarked on."""
 
@@ -66,13 +70,28 @@ class Placed:
         return DOUBT_FACTOR * self.scale * self.fit.place_sd
 
     @property
+    def focal_doubt(self) -> Array:
+        """The same of its focal length, of shape (C,), relative; 0 where it was given."""
+        return DOUBT_FACTOR * self.fit.focal_sd
+
+    @property
     def angle_doubt(self) -> Array:
         """The same of its direction, of shape (C,), rad."""
         return DOUBT_FACTOR * self.fit.angle_sd
 
 
-def place_cameras(rig: Rig, options: Options, listener: Listener | None = None) -> Placed:
-    """The places and directions of cameras with known lenses and rough places, from the person in their films.
+def open_rough(recording: Path, options: Options) -> tuple[Rig, float]:
+    """The rig of a recording with cameras as its rough.toml places them, or else its calibration; and the `rough_focal` of their lenses,
+    0 if they are known. Raises a `ShadowPuppetError`."""
+    file = recording / ROUGH_NAME
+    if not file.exists():
+        return open_rig(recording, options), 0.0
+    return open_rig(recording, replace(options, calibration=file)), ROUGH_FOCAL
+
+
+def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, rough_focal: float = 0.0) -> Placed:
+    """The places and directions of cameras with rough places, from the person in their films; focal lengths, too, unless `rough_focal` is 0
+    (see `place_by_outlines`).
 
     The scale is the one at which the person is as tall as `options.height` or the recording's; without, the rough calibration's. Raises
     `CalibrationError` if too little of the person is seen by two cameras at a time, or a camera's rough place is not known.
@@ -85,7 +104,7 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None) 
     listener = listener or Listener()
     rows = compared_sets(rig, options, listener)
     listener.begin("placing the cameras")
-    fit = place_by_outlines(rig.cameras, rows)
+    fit = place_by_outlines(rig.cameras, rows, rough_focal=rough_focal)
     listener.begin("floor and height")
     return grounded(fit, rows, options.height or rig.recording.subject.height)
 
@@ -98,10 +117,10 @@ def compared_sets(rig: Rig, options: Options, listener: Listener) -> list[Row]:
 
 def grounded(fit: TangencyFit, rows: Sequence[Row], height: float | None) -> Placed:
     """The cameras of a fit with the floor at z = 0 and, if the person's height (metres) is known, in metres: by the visual hulls' ends."""
-    ends, advice = _ends(fit.cameras, rows), list(_doubts(fit))
+    ends, advice = _ends(fit.cameras, rows), list[str]()
     if ends is None:
         advice.append("floor and scale are the rough calibration's: the person is hardly ever whole in two pictures")
-        return Placed(cameras=fit.cameras, fit=fit, sets=len(rows), scale=1.0, tilt=0.0, advice=tuple(advice))
+        return _with_doubts(Placed(cameras=fit.cameras, fit=fit, sets=len(rows), scale=1.0, tilt=0.0, advice=tuple(advice)))
     level, tilt = _floor(ends)
     usual, tall = np.percentile(_above(level, ends.top), [50, STANDING])
     if height is None:
@@ -109,8 +128,12 @@ def grounded(fit: TangencyFit, rows: Sequence[Row], height: float | None) -> Pla
     elif tall > MAX_CROUCH * usual:
         advice.append(f"the scale is rough: the person bends in most of the film ({usual:.2f} m high, {tall:.2f} when upright)")
     scale = 1.0 if height is None else height / float(tall)
-    return Placed(cameras=tuple(_seen_from(camera, level, scale) for camera in fit.cameras), fit=fit, sets=len(rows), scale=scale,
-                  tilt=tilt, advice=tuple(advice))
+    return _with_doubts(Placed(cameras=tuple(_seen_from(camera, level, scale) for camera in fit.cameras), fit=fit, sets=len(rows),
+                               scale=scale, tilt=tilt, advice=tuple(advice)))
+
+
+def _with_doubts(placed: Placed) -> Placed:
+    return replace(placed, advice=(*_doubts(placed), *placed.advice))
 
 
 class _Ends(NamedTuple):
@@ -180,16 +203,25 @@ def _seen_from(camera: Camera, level: Array, scale: float) -> Camera:
     return replace(camera, T_camera_world=T)
 
 
-def _doubts(fit: TangencyFit) -> Iterator[str]:
+def _doubts(placed: Placed) -> Iterator[str]:
     """What to doubt about the fit, a sentence each."""
-    if fit.far > MANY_FAR:
-        yield (f"{100 * fit.far:.0f} % of the tangents do not fit: are the films in step (`shadowpuppet check`), and are silhouettes "
-               "whole? A leg that is missing in one camera moves all others")
+    if placed.fit.far > MANY_FAR:
+        yield (f"{100 * placed.fit.far:.0f} % of the tangents do not fit: are the films in step (`shadowpuppet check`), and are "
+               "silhouettes whole? A leg that is missing in one camera moves all others")
     poor = [f"{camera.name} to {1000 * place:.0f} mm and {np.degrees(angle):.1f} degrees"
-            for camera, place, angle in zip(fit.cameras, DOUBT_FACTOR * fit.place_sd, DOUBT_FACTOR * fit.angle_sd)
+            for camera, place, angle in zip(placed.cameras, placed.place_doubt, placed.angle_doubt)
             if place > MAX_PLACE_DOUBT or angle > MAX_ANGLE_DOUBT]
     if poor:
         yield f"places are not well known ({', '.join(poor)}): film a person who walks through all of the room, bends and reaches"
+    if (doubt := float(placed.focal_doubt.max())) > MAX_FOCAL_DOUBT:
+        yield (f"focal lengths are known to {100 * doubt:.1f} % only, and places suffer: a board filmed by each camera tells them "
+               "(`shadowpuppet calibrate LAB`), once for all recordings")
+
+
+def _replaced(camera: Camera, now: Camera, before: Camera) -> Camera:
+    """The camera at its new place, its focal length changed by as much as that of `before`, whose pictures may be reduced."""
+    factor = np.array([now.matrix[0, 0] / before.matrix[0, 0], now.matrix[1, 1] / before.matrix[1, 1], 1])
+    return replace(camera, T_camera_world=now.T_camera_world, matrix=camera.matrix * factor)
 
 
 def write_placed(rig: Rig, placed: Placed, path: Path | None = None) -> list[Path]:
@@ -199,7 +231,7 @@ def write_placed(rig: Rig, placed: Placed, path: Path | None = None) -> list[Pat
     own = path == rig.recording.path / "calibration.toml"
     if not path.parent.is_dir():
         raise CalibrationError(f"{path}: its folder does not exist")
-    places = {camera.name: camera.T_camera_world for camera in placed.cameras}
-    written = replace_calibration(path, [replace(view.camera, T_camera_world=places.get(view.camera.name, view.camera.T_camera_world))
+    placings = {camera.name: (camera, old) for camera, old in zip(placed.cameras, rig.cameras)}
+    written = replace_calibration(path, [_replaced(view.camera, *placings.get(view.camera.name, (view.camera, view.camera)))
                                          for view in rig.recording.views])
     return [*written, *(write_notes(rig.recording.path / "recording.toml", {"calibration": None}) if own else [])]
