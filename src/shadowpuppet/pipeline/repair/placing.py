@@ -68,8 +68,7 @@ class Placed:
     advice: tuple[str, ...]
     """What to doubt, a sentence each; none if all is well."""
     starts: dict[str, float]
-    """Seconds by which each film was found to be later than the first, by camera, all together with the recording's own [start]; empty if
-    these stay as they are."""
+    """[start] of the recording by camera, seconds, as found; the earliest film begins when it did. Empty if all stay as they are."""
 
     @property
     def place_doubt(self) -> Array:
@@ -122,7 +121,8 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, 
         fit = place_by_outlines(there.cameras, chosen_sets(sets), rough_focal=rough_focal)
     listener.begin("floor and height")
     placed = grounded(fit, chosen_sets(sets), options.height or rig.recording.subject.height)
-    starts = {view.camera.name: round(view.start, 4) for view in there.recording.views}
+    early = min(view.start for view in there.recording.views) - min(view.start for view in rig.recording.views)  # of the clock itself
+    starts = {view.camera.name: round(view.start - early, 4) for view in there.recording.views}
     changed = any(abs(starts[view.camera.name] - view.start) > SAME_START for view in rig.recording.views)
     return replace(placed, starts=starts) if changed else placed
 
