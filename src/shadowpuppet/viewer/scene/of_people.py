@@ -33,10 +33,11 @@ def people_scene(folder: str | Path, folders: Mapping[int, Path], recording: str
         figures += _truths(Path(folder))
     except ShadowPuppetError as error:
         problems.append(f"no truth is shown: {error}")
+    times = np.unique(np.concatenate([scene.times for scene in scenes.values()]).round(6))
     counts = {f"person {number}": scene.facts["frames"] for number, scene in scenes.items()}
     facts = {"run": str(folder), **{key: value for key, value in first.facts.items() if key not in ("run", "frames")}, **counts}
-    return replace(first, title=Path(folder).resolve().name, times=np.unique(np.concatenate([scene.times for scene in scenes.values()]).round(6)),
-                   figures=tuple(figures), charts=(*_overlaps(scenes), *_others(scenes)), cloud=None, facts=facts,
+    return replace(first, title=Path(folder).resolve().name, times=times, figures=tuple(figures),
+                   charts=(*_overlaps(scenes), *_others(scenes)), cloud=None, facts=facts,
                    notes=tuple(dict.fromkeys(note for scene in scenes.values() for note in scene.notes)),
                    problems=tuple(dict.fromkeys(problems)))
 
