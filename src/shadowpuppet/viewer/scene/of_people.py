@@ -28,7 +28,7 @@ def people_scene(folder: str | Path, folders: Mapping[int, Path], recording: str
     scenes = {number: run_scene(path, None, recording, films=number == min(folders)) for number, path in folders.items()}
     first, problems = scenes[min(scenes)], [problem for scene in scenes.values() for problem in scene.problems]
     figures = [replace(figure, name=f"person {number}", tint=TINTS[(number - 1) % len(TINTS)])
-               for number, scene in scenes.items() for figure in scene.figures]
+               for number, scene in scenes.items() for figure in scene.figures if figure.kind == "estimate"]
     try:
         figures += _truths(Path(folder))
     except ShadowPuppetError as error:
