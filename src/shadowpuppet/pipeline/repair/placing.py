@@ -45,6 +45,8 @@ MAX_PLACE_DOUBT, MAX_ANGLE_DOUBT = 0.02, np.radians(0.3)
 """Doubts about a camera's place, metres, and direction, rad, that are not remarked on."""
 MAX_FOCAL_DOUBT = 0.01
 """Relative doubt about a focal length that is not remarked on."""
+STATED_FOCAL = ("fields of view stay as they are stated: this film does not tell them; a person who walks near and far would, and a board "
+                "filmed by each camera (`shadowpuppet calibrate LAB`)")
 ROUGH_NAME = "rough.toml"
 """Name of a recording's file with rough places (`io.calibration.rough`), which counts before its calibration."""
 MANY_FAR = 0.15
@@ -118,12 +120,14 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, 
     if any(late):
         there = in_step(there, [sets.every * steps / there.rate for steps in late])
         sets = gather_silhouettes(there, options, listener, whole=True)
-        fit = place_by_outlines(there.cameras, chosen_sets(sets), rough_focal=rough_focal)
+        fit = placed_by_rows(there.cameras, chosen_sets(sets), rough_focal)
     listener.begin("floor and height")
+    unknown = rough_focal > 0 and not fit.focal_sd.any()
     placed = grounded(fit, chosen_sets(sets), options.height or rig.recording.subject.height)
     early = min(view.start for view in there.recording.views) - min(view.start for view in rig.recording.views)  # of the clock itself
     starts = {view.camera.name: round(view.start - early, 4) for view in there.recording.views}
     changed = any(abs(starts[view.camera.name] - view.start) > SAME_START for view in rig.recording.views)
+    placed = replace(placed, advice=(*placed.advice, STATED_FOCAL)) if unknown else placed
     return replace(placed, starts=starts) if changed else placed
 
 
@@ -142,7 +146,7 @@ def placed_in_step(cameras: Sequence[Camera], sets: SilhouetteSets, rough_focal:
             if steps in best:
                 break
             try:
-                fit = place_by_outlines(cameras, aligned_sets(sets.rows, steps, SETS), rough_focal=rough_focal)
+                fit = placed_by_rows(cameras, aligned_sets(sets.rows, steps, SETS), rough_focal)
             except CalibrationError:
                 if not best:
                     raise
@@ -154,6 +158,13 @@ def placed_in_step(cameras: Sequence[Camera], sets: SilhouetteSets, rough_focal:
     steps = min(best, key=lambda steps: best[steps][0].far)
     fit, shifts = best[steps]
     return fit, (np.where(np.abs(shifts - steps) < 1, shifts, steps) if any(steps) else np.zeros(len(steps))).tolist()
+
+
+def placed_by_rows(cameras: Sequence[Camera], rows: Sequence[Row], rough_focal: float) -> TangencyFit:
+    """As `place_by_outlines`; focal lengths that the film tells less well than `rough_focal` stay as they are."""
+    fit = place_by_outlines(cameras, rows, rough_focal=rough_focal)
+    known = DOUBT_FACTOR * float(fit.focal_sd.max()) <= rough_focal
+    return fit if known else place_by_outlines(cameras, rows)
 
 
 def _shifts(cameras: Sequence[Camera], sets: SilhouetteSets) -> Array:
