@@ -70,6 +70,14 @@ def test_focal_lengths_come_back_with_the_places(true, rows):
         np.testing.assert_array_equal(camera.matrix, before.matrix)
 
 
+@pytest.mark.parametrize("stands", [[5], [5, 6]])
+def test_of_a_person_who_keeps_still_nothing_is_stated_for_certain(true, rows, stands):
+    """Sets that are alike agree with each other, whatever their error."""
+    fit = place_by_outlines(rough(true, np.random.default_rng(3), 3.0, 0.1), [rows[n] for n in stands] * (FRAMES // len(stands)))
+    assert (3 * fit.place_sd > errors(fit.cameras, true)[0]).all()
+    assert (3 * fit.place_sd > 0.1).all()
+
+
 @pytest.mark.parametrize("which", [0, 1])
 def test_cameras_come_back_from_rough_places(true, rows, fits, which):
     start, fit = fits[which]

@@ -39,6 +39,9 @@ NUDGE = 1e-5
 """Difference of the numeric derivatives, rad, m and share of the focal length."""
 TURN, MOVE, FOCAL, PARAMETERS = slice(0, 3), slice(3, 6), 6, 7
 """A camera's increments: a rotation vector and a displacement along its axes, rad and m, and the logarithm of its focal length's factor."""
+OUTLINE_ERROR, OUTLINE_SHIFT = 0.5, 10.0
+"""Error of an outline that does not change while the person stands still, and the movement of its middle that makes another outline of it,
+pixels of a picture 1000 wide."""
 BLOCKS = 20
 """Number of parts of the film whose disagreement tells the standard deviations."""
 
@@ -265,8 +268,9 @@ def _normal(parts: Iterable[_Linear], size: int, scale: float) -> tuple[Array, A
 def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], found: Sequence[Array],
                 free: Sequence[int], scale: float, deviations: Array) -> tuple[Array, Array, Array]:
     """Standard deviations of centres (C,), m, directions (C,), rad, and focal lengths (C,), relative, from how much parts of the film
-    would move them (a "sandwich" of gradients by blocks of sets: neighbouring silhouettes err together). If all cameras are free, within
-    the rig: not of what a motion or a scale of the whole rig changes."""
+    would move them (a "sandwich" of gradients by blocks of sets: neighbouring silhouettes err together), and at least from an error
+    `OUTLINE_ERROR` of every outline that differs from the others: a person who stands still shows few. If all cameras are free, within the
+    rig: not of what a motion or a scale of the whole rig changes."""
     size = PARAMETERS * len(cameras)
     parts = list(_linearised(cameras, hulls, pairs, np.zeros((len(cameras), PARAMETERS)), found, free))
     H, _ = _normal(parts, size, scale)
@@ -278,11 +282,29 @@ def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Seque
             blocks[:, column] += np.bincount(part.sets * BLOCKS // sets, pulls[k], BLOCKS)
     places = _places(free, deviations)
     basis = np.linalg.svd(_whole_rig(cameras)[places].T)[2][7:].T if len(free) == len(cameras) else np.eye(len(places))
-    spread = basis @ np.linalg.pinv(basis.T @ H[np.ix_(places, places)] @ basis, hermitian=True) @ basis.T @ blocks[:, places].T
+    pixels = scale / LOSS_SCALES[-1]
+    alike = sets / _distinct(hulls, OUTLINE_SHIFT * pixels) * (OUTLINE_ERROR * pixels) ** 2
+    prior = np.diag(np.tile(1 / np.square(deviations[deviations > 0]), len(free)))
+
+    def inverse(noise: float) -> Array:
+        return basis @ np.linalg.inv(basis.T @ (H[np.ix_(places, places)] / noise + prior) @ basis) @ basis.T
+
+    within = ((inverse(1.0) @ blocks[:, places].T) ** 2).sum(1) * BLOCKS / (BLOCKS - 1)
     own = np.zeros(size)
-    own[places] = (spread**2).sum(1) * BLOCKS / (BLOCKS - 1)
+    own[places] = np.maximum(within, np.diag(inverse(alike)))
     own = own.reshape(-1, PARAMETERS)
     return np.sqrt(own[:, MOVE].sum(1)), np.sqrt(own[:, TURN].sum(1)), np.sqrt(own[:, FOCAL])
+
+
+def _distinct(hulls: Sequence[_Hulls], shift: float) -> int:
+    """Number of sets that differ from all those counted before: in one camera at least the outline's middle is a `shift`, pixels, away."""
+    middles = np.stack([each.focal * each.rays.mean(1)[:, :2] for each in hulls], 1)
+    middles[~np.stack([each.firm.any(1) for each in hulls], 1)] = np.nan
+    kept = list[Array]()
+    for middle in middles:
+        if all((np.linalg.norm(middle - other, axis=1) > shift).any() for other in kept):
+            kept.append(middle)
+    return max(len(kept), 1)
 
 
 def _whole_rig(cameras: Sequence[Camera]) -> Array:
