@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.evaluation.error_metrics import true_stretches
 from shadowpuppet.evaluation.evaluation import Evaluation
+from shadowpuppet.evaluation.movement.angles import PERCENT, Cycle
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.intervals import HALF_WIDTH
 from shadowpuppet.io.motion.table import dof_unit
@@ -197,6 +198,30 @@ def angles_over_time(of: Evaluation) -> str:
         drawn = {label: handle for axes in places.values() for handle, label in zip(*axes.get_legend_handles_labels())}
         figure.legend(drawn.values(), drawn.keys(), loc="outside upper center", ncols=len(drawn))
         return _svg(figure, "angles")
+
+
+def gait_cycle(cycles: Sequence[Cycle], stance: Mapping[str, float]) -> str:
+    """Every angle over the gait cycle, both sides in one panel, with `stance`, % of the cycle by side, dotted."""
+    panels = list(dict.fromkeys(each.name for each in cycles))
+    rows = -(-len(panels) // COLUMNS)
+    with _drawing("cycle", (10, 0.6 + 1.6 * rows), rows, (1,) * rows, COLUMNS) as (figure, grid):
+        places = dict(zip(panels, grid.flat))
+        for axes in list(grid.flat)[len(panels) :]:
+            axes.set_axis_off()
+        for each in cycles:
+            axes, colour = places[each.name], SIDES[each.side]
+            axes.fill_between(PERCENT, each.mean - each.stated, each.mean + each.stated, color=colour, alpha=0.1, lw=0)
+            axes.fill_between(PERCENT, each.mean - each.sd, each.mean + each.sd, color=colour, alpha=0.35, lw=0)
+            axes.plot(PERCENT, each.mean, color=colour, lw=1.4, label=each.side)
+        for name, axes in places.items():
+            for side, percent in stance.items():
+                axes.axvline(percent, color=SIDES[side], lw=0.9, ls=":")
+            axes.set_title(name, fontsize=9, loc="left", pad=3)
+            axes.set(xlim=(0, 100), xticks=(0, 25, 50, 75, 100))
+            axes.tick_params(labelsize=8)
+        drawn = {label: handle for axes in places.values() for handle, label in zip(*axes.get_legend_handles_labels())}
+        figure.legend(drawn.values(), drawn.keys(), loc="outside upper center", ncols=len(drawn))
+        return _svg(figure, "cycle")
 
 
 def coverage_chart(coverage: Mapping[str, Any], levels: Sequence[str]) -> str:
