@@ -60,7 +60,7 @@ def test_figures_are_those_of_the_steps_and_intervals_those_of_the_run(movement)
     assert movement.no_gait == ""
     lengths = np.array([step.length for step in gait.counted if step.side == "left"])
     length = by_name["step length"].left
-    assert (length.count, length.mean, length.sd) == (len(lengths), pytest.approx(lengths.mean()), pytest.approx(lengths.std(ddof=1)))
+    assert (length.number, length.mean, length.sd) == (len(lengths), pytest.approx(lengths.mean()), pytest.approx(lengths.std(ddof=1)))
     assert length.stated == pytest.approx(HALF_WIDTH * SD_JOINT * np.sqrt(2))
     both = by_name["stride time"].both
     assert by_name["cadence"].both.mean == pytest.approx(120 / both.mean, rel=0.01)
@@ -79,7 +79,7 @@ def test_angles_over_the_cycle_are_those_of_the_strides(run, movement):
     np.testing.assert_allclose(knee.mean, true.mean(0), atol=0.1)
     np.testing.assert_allclose(knee.sd, true.std(0, ddof=1), atol=0.1)
     np.testing.assert_allclose(knee.stated, HALF_WIDTH * 2.0)
-    assert knee.count == len(strides)
+    assert knee.number == len(strides)
     assert {side for name, side in cycles if name == "root bow"} == {*SIDES}  # of the middle, over both feet's cycles
 
 
@@ -113,7 +113,7 @@ def test_a_motion_without_strides_has_ranges_over_the_frames_vouched_for(tmp_pat
     assert found.stated == pytest.approx(HALF_WIDTH * 2.0)
 
 
-@pytest.mark.parametrize(("body", "why"), [("rounded", "has no heels and toes"), ("anatomical", "no f")])
+@pytest.mark.parametrize(("body", "why"), [("rounded", "has no feet"), ("anatomical", "no f")])
 def test_who_takes_no_stride_is_told_why(tmp_path, body, why):
     folder = runs.make_run(tmp_path / "run", body, lost=(3,), spread=True)
     found = movement_of(read_run(folder))

@@ -54,7 +54,7 @@ class Cycle(NamedTuple):
     name: str
     side: str
     """Of the foot."""
-    count: int
+    number: int
     """Strides of it in which the angle is known throughout, and vouched for in all but `MOST_DOUBT` of the frames."""
     mean: Array
     sd: Array

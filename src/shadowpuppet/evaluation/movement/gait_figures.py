@@ -16,7 +16,7 @@ from shadowpuppet.motion.contact.steps import Gait
 class Spread(NamedTuple):
     """A quantity over steps or strides."""
 
-    count: int
+    number: int
     mean: float
     sd: float
     """Over the steps or strides; NaN for fewer than two."""

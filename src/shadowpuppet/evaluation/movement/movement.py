@@ -47,8 +47,8 @@ def gait_of(run: Run) -> tuple[Gait | None, str]:
     contacts = contacts_of(motion.table) if len(motion) else None
     if contacts is None:
         soles = [name for name in motion.joint_names if name in SOLES]
-        return None, ("no foot ever stands" if soles else f"the body {motion.body_name!r} has no heels and toes; several cameras and the "
-                      "body 'anatomical' have")
+        return None, ("no foot ever stands" if soles else f"the body {motion.body_name!r} has no feet; the body 'anatomical' has, with "
+                      "several cameras")
     gait = find_gait(motion.times, contacts, motion.joint_names, motion.joints, motion.joint_sd, _sure(motion))
     strikes = " and ".join(f"{gait.strikes[side]} of the {side} foot" for side in SIDES)
     return gait, "" if gait.strides else f"no full stride: {strikes} strike the floor; {left_out_text(gait)}"
@@ -90,11 +90,11 @@ def write_movement(path: str | Path, movement: Movement) -> None:
 def _lines(movement: Movement) -> Iterator[list[str]]:
     for each in movement.figures:
         for side, own in zip((*SIDES, "both"), (each.left, each.right, each.both)):
-            yield [each.name, side, each.unit, "", str(own.count), *cells([own.mean, own.sd, own.stated], 4)]
+            yield [each.name, side, each.unit, "", str(own.number), *cells([own.mean, own.sd, own.stated], 4)]
         yield [f"{each.name}: symmetry", "", "%", "", "", *cells([each.symmetry, np.nan, np.nan], 2)]
     for each in movement.cycles:
         for percent, *values in zip(PERCENT, each.mean, each.sd, each.stated):
-            yield [each.name, each.side, "deg", f"{percent:.0f}", str(each.count), *cells(values, 3)]
+            yield [each.name, each.side, "deg", f"{percent:.0f}", str(each.number), *cells(values, 3)]
     for each in movement.ranges:
         for name, unit, value, stated in (("minimum", "deg", each.low, each.stated), ("maximum", "deg", each.high, each.stated),
                                           ("range", "deg", each.high - each.low, np.nan), ("peak speed", "deg/s", each.speed, np.nan)):

@@ -55,11 +55,11 @@ def _cells(each: Figure) -> list[str]:
     symmetry = "" if np.isnan(each.symmetry) or each.name == "step width" else f"{each.symmetry:+.1f}"
     stated = "" if np.isnan(each.both.stated) else f"± {each.both.stated:.{decimals}f}"
     return [f"{each.name}, {each.unit}", *(_spread(own, decimals) for own in (each.left, each.right, each.both)), stated, symmetry,
-            str(each.both.count)]
+            str(each.both.number)]
 
 
 def _spread(own: Spread, decimals: int) -> str:
-    if not own.count:
+    if not own.number:
         return ""
     return f"{own.mean:.{decimals}f}" + ("" if np.isnan(own.sd) else f" ± {own.sd:.{decimals}f}")
 
