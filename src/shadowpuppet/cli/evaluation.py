@@ -121,7 +121,9 @@ def _tables(measured: Mapping[str, Any]) -> Iterator[Any]:
         yield table("mean error (MPJPE), mm, after alignment", ("", "mm"),
                     ((text.format(root=root_text(aligned)), f"{aligned[way]:.1f}") for way, text in WAYS.items() if way in aligned))
     if "angles_deg" in measured:
-        yield table("", ("turned at", "by degrees, rmse"), ((name, f"{value:.1f}") for name, value in measured["angles_deg"].items()))
+        aligned = measured["angles_aligned_deg"]
+        yield table("", ("turned at", "by degrees, rmse", "frames aligned"),
+                    ((name, f"{value:.1f}", f"{aligned[name]:.1f}") for name, value in measured["angles_deg"].items()))
 
 
 def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

@@ -111,7 +111,8 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
     measured["feet"] = standing_figures(run.motion.table, reference, flags)
     if how.angles:
         poses = compared_poses(run.motion, theirs)
-        measured |= {"angles_deg": turn_errors(*poses), "dofs_deg": dof_errors(*poses)}
+        measured |= {"angles_deg": turn_errors(*poses), "angles_aligned_deg": turn_errors(*poses, aligned=True),
+                     "dofs_deg": dof_errors(*poses)}
     return Evaluation(run, info | measured, cameras, ours, theirs, errors)
 
 

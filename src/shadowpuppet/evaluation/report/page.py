@@ -65,6 +65,10 @@ def _parts(of: Evaluation, name: str) -> Iterator[str]:
         yield from _joints(of)
         yield from _motion(of)
         yield body_tables(of)
+        if of.measured["bends_deg"]:
+            note = ("Bland and Altman's plot of the bends: is the difference from the truth the same at every angle? Lines: its mean, and "
+                    "1.96 standard deviations on both sides.")
+            yield figure(charts.bland_altman(of), note)
     if len(of.run.motion) and any(dof_unit(name) == "rad" for name in of.run.motion.dof_names):
         yield _angles(of)
         yield movement_section(movement_of(of.run))
