@@ -18,18 +18,20 @@ import numpy as np
 import smallest
 from faults import into_page
 
-from shadowpuppet.calibration.solve.tangency_bundle import ROUGH_FOCAL, place_by_outlines
+from shadowpuppet.calibration.solve.tangency_bundle import ROUGH_FOCAL
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array, align, rigid, rotation_from_vector, unit, vector_from_rotation
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.progress import Listener
-from shadowpuppet.pipeline.repair.placing import DOUBT_FACTOR, compared_sets, grounded
+from shadowpuppet.pipeline.repair.check import SilhouetteSets, aligned_sets, gather_silhouettes
+from shadowpuppet.pipeline.repair.placing import DOUBT_FACTOR, SETS, grounded, placed_in_step
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.synthetic import Gesture, Mannequin, Ring, Scene, Spec, synthesize
 
 BUILD = Path(__file__).resolve().parent.parent / "build" / "placing"
-ROUGH = ((0.0, 0.0, 0.0), (1.0, 0.05, 0.0), (5.0, 0.3, 0.0), (10.0, 0.5, 0.0), (10.0, 0.5, 3.0))
-"""Degrees and metres by which each camera is off, and the standard deviation of its focal length, per cent, which is solved then."""
+ROUGH = ((0.0, 0.0, 0.0, 0), (1.0, 0.05, 0.0, 0), (5.0, 0.3, 0.0, 0), (10.0, 0.5, 0.0, 0), (10.0, 0.5, 3.0, 0), (5.0, 0.3, 3.0, 8))
+"""Degrees and metres by which each camera is off; the standard deviation of its focal length, per cent, which is solved then; frames by
+which its film is late or early at most, which is found then."""
 COUNTS, SIZE, HEIGHT = (3, 4, 6), (480, 360), 1.75
 HEADER = ("| recording | cameras | off by | tangents apart, px | within the rig: mm | degrees | stated, mm | in the world: mm |\n"
           "|---|---:|---|---:|---:|---:|---:|---:|")  # fmt: skip
@@ -66,27 +68,36 @@ def errors(found: Sequence[Camera], true: Sequence[Camera]) -> tuple[float, floa
             float(np.linalg.norm(here - there, axis=1).mean()))
 
 
+def shifted(sets: SilhouetteSets, steps: Sequence[int]) -> SilhouetteSets:
+    """The sets of films that begin later or earlier, by `steps` sets each."""
+    count = len(sets.rows)
+    return sets._replace(rows=[[row[k] if 0 <= f - step < count and (row := sets.rows[f - step]) else None for k, step in enumerate(steps)]
+                               for f in range(count)])
+
+
 def rows(path: Path, options: Options, height: float | None, seeds: int, rough: Sequence[tuple[float, ...]]) -> Iterator[str]:
     """A row of the table for each roughness, means over seeds."""
     rig = open_rig(path, options)
-    sets = compared_sets(rig, options, Listener())
-    for degrees, metres, lens in rough:
+    in_step = gather_silhouettes(rig, options, Listener(), whole=True)
+    for degrees, metres, lens, late in rough:
         figures = list[Array]()
         for seed in range(seeds if degrees else 1):
             rng = np.random.default_rng([seed, len(rig.cameras)])
-            fit = place_by_outlines([off(camera, rng, degrees, metres, lens) for camera in rig.cameras], sets,
-                                    rough_focal=ROUGH_FOCAL if lens else 0.0)
-            within, turned, world = errors(grounded(fit, sets, height).cameras, rig.cameras)
+            cameras = [off(camera, rng, degrees, metres, lens) for camera in rig.cameras]
+            sets = shifted(in_step, rng.integers(-late, late + 1, len(cameras)).tolist()) if late else in_step
+            fit, steps = placed_in_step(cameras, sets, ROUGH_FOCAL if lens else 0.0)
+            within, turned, world = errors(grounded(fit, aligned_sets(sets.rows, steps, SETS), height).cameras, rig.cameras)
             figures.append(np.array([np.nanmean(fit.before), np.nanmean(fit.after), 1000 * within, np.degrees(turned),
                                      1000 * DOUBT_FACTOR * fit.place_sd.mean(), 1000 * world]))
         before, after, within, turned, stated, world = np.mean(figures, axis=0)
         rough_by = f"{degrees:g}°, {100 * metres:g} cm" + (f", lens {lens:g} %" if lens else "")
+        rough_by += f", {late:g} frames" if late else ""
         yield (f"| `{path.name}` | {len(rig.cameras)} | {rough_by} | {before:.1f} → {after:.2f} | {within:.0f} | {turned:.2f} | "
                f"{stated:.0f} | {world:.0f} |")
 
 
 def _smallest(folder: Path) -> list[object]:
-    return ["--recordings", *made(folder, (3,), (160, 120), 3.0), "--seeds", 1, "--masks", "--rough", "2,0.1,2",
+    return ["--recordings", *made(folder, (3,), (160, 120), 3.0), "--seeds", 1, "--masks", "--rough", "2,0.1,2,1",
             "--markdown", smallest.copy(Path(__file__).resolve().parent.parent / "docs" / "calibration.md", folder)]
 
 
@@ -97,7 +108,7 @@ def main() -> None:
     parser.add_argument("--masks", action="store_true", help="the recordings' exact silhouettes in place of those of the films")
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--height", type=float, help=f"of the person, metres; {HEIGHT} for made recordings")
-    parser.add_argument("--rough", nargs="*", default=[",".join(map(str, each)) for each in ROUGH], help="degrees,metres,per cent")
+    parser.add_argument("--rough", nargs="*", default=[",".join(map(str, each)) for each in ROUGH], help="degrees,metres,per cent,frames")
     parser.add_argument("--markdown", type=Path, help="page for the table, at its place")
     args = smallest.parse(parser, _smallest)
     lines, rough = [HEADER], [tuple(map(float, each.split(","))) for each in args.rough]

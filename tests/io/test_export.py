@@ -37,6 +37,19 @@ from shadowpuppet.motion.motion import JointTable
 LOST = (0, 6, 7)
 
 
+def test_of_several_people_there_is_a_file_each(tmp_path, shell):
+    folder = runs.make_people(tmp_path / "pair")
+    code, out, err = shell("export", str(folder), "--to", "csv,bvh")
+    assert code == 0, err
+    assert "pair-person-2.csv" in out
+    written = sorted(path.name for path in (folder / "export").iterdir())
+    assert written == ["pair-person-1.bvh", "pair-person-1.csv", "pair-person-2.bvh", "pair-person-2.csv"]
+    for n in (1, 2):
+        found = read_motion(folder / "export" / f"pair-person-{n}.csv")
+        alone = read_run(folder / f"person-{n}").motion
+        assert found.times[0] == pytest.approx(alone.times[0], abs=1e-4)
+
+
 @pytest.fixture(scope="module", params=["rounded", "anatomical", "cylinders"])
 def run(request, tmp_path_factory):
     return runs.make_run(tmp_path_factory.mktemp("runs") / "walk", request.param, lost=LOST, spread=True)

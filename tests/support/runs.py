@@ -9,6 +9,7 @@ import numpy as np
 from shadowpuppet.body.models import MODELS, average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array, rigid, rotation_about
+from shadowpuppet.io.people import PEOPLE, person_folder, write_header, write_place
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run_writer import RunWriter
 from shadowpuppet.motion.limbs import limbs_of
@@ -60,4 +61,17 @@ def make_run(folder: Path, name: str = "anatomical", frames: int = 40, seed: int
                 sd = {"joint_sd": rng.uniform(0.001, 0.03, places[t].shape)} if spread else {}
                 limbs = [(doubtful or {}).get(t, {}).get(limb, "tracked") for limb in limbs_of(joints)]
                 run.write(MotionFrame(times[t], "tracked", poses[t], places[t], cost=10.0, overlap=0.9, limb_status=limbs, **sd))
+    return folder
+
+
+def make_people(folder: Path, number: int = 2, frames: int = 12) -> Path:
+    """A finished run of several people, the second of whom is seen from frame 2 on."""
+    for n in range(1, number + 1):
+        times = np.arange(frames) / RATE + (2 / RATE if n == 2 else 0)
+        make_run(person_folder(folder, n), frames=frames, seed=n, spread=True, times=times)
+    with (folder / PEOPLE).open("wb") as file:
+        write_header(file)
+        for n in range(1, number + 1):
+            write_place(file, 0.0, n, "tracked", np.array([float(n), 0.0]))
+    (folder / "run.toml").write_text((person_folder(folder, 1) / "run.toml").read_text())
     return folder

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from runs import body_of, make_run, smooth_poses
+from runs import body_of, make_people, make_run, smooth_poses
 
 from shadowpuppet.body.shapes import Quads
 from shadowpuppet.camera.camera import Camera
@@ -47,6 +47,7 @@ from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
 from shadowpuppet.viewer.scene.scene import Chart, Figure, Scene, SceneCamera
 from shadowpuppet.viewer.web.curves import AROUND, data_around, limits
 from shadowpuppet.viewer.web.frustum_images import PictureMode, Undistorter, frustum_image
+from shadowpuppet.viewer.web.nodes import colour_of
 from shadowpuppet.viewer.web.page import kept_frames, sealed_page
 from shadowpuppet.viewer.web.timeline import Timeline
 
@@ -428,6 +429,23 @@ def test_two_runs_side_by_side_or_over_each_other(tmp_path):
     assert len(both.times) == 14
     curves = next(chart for chart in both.charts if chart.name == "angles: left arm").curves
     assert sum(name.endswith(", beside") for name in curves) == len(curves) / 2
+
+
+def test_all_people_of_a_run_are_shown_in_one_world(tmp_path):
+    scene = open_scene(make_people(tmp_path / "pair"))
+    assert [(figure.name, figure.kind, figure.shift) for figure in scene.figures] == [("person 1", "estimate", (0, 0, 0)),
+                                                                                      ("person 2", "estimate", (0, 0, 0))]
+    assert scene.figures[0].tint != scene.figures[1].tint
+    colours = {colour_of("estimate", np.array([0.5, 0.2, 0.1]), figure.tint) for figure in scene.figures}
+    assert len(colours) == 2
+    assert len(scene.times) == 14  # the second is seen from frame 2 on
+    assert scene.figures[1].at(0.0) is None
+    assert scene.figures[0].at(0.0) == 0
+    names = [chart.name for chart in scene.charts]
+    assert {"person 1, angles: left arm", "person 2, angles: left arm"} <= set(names)
+    assert {"person 1", "person 2"} <= set(scene.facts)
+    with pytest.raises(ShadowPuppetError, match=r"it is a run of several people; view .*person-1"):
+        open_scene(tmp_path / "pair", truth=tmp_path / "truth.csv")
 
 
 # Priors and files

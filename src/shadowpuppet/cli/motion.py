@@ -82,20 +82,22 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
 
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.io.export import export_run
+    from shadowpuppet.io.people import person_folders
     from shadowpuppet.io.run import read_run
 
+    one = next(iter(person_folders(run).values()), run)
     names = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
     with terminal(quiet) as listener:
         if to == "all" and find_spec("pyarrow") is None:
             names.remove("parquet")
             listener.warn("parquet is left out: it needs pyarrow; pip install 'shadowpuppet[formats]'")
-        if to == "all" and read_run(run).motion.body_name not in WHOLE:
+        if to == "all" and read_run(one).motion.body_name not in WHOLE:
             names.remove("osim")
             listener.warn("osim is left out: only whole bodies have bones of constant lengths, as an OpenSim model needs")
         listener.begin("exporting")
         written = export_run(run, names, folder, unit, missing, model, weight)
     if not quiet:
-        level = read_run(run).floor
+        level = read_run(one).floor
         side = "below" if level < 0 else "above"
         floor = f"{abs(level):.2f} m {side} the camera, where the lowest foot over the film is; at 0 in these files"
         show(pairs([("made", "\n".join(map(str, written))), ("floor", floor if level else None)]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,6 +33,7 @@ from shadowpuppet.io.motion.skeletons import ENDINGS as SKELETON_ENDINGS
 from shadowpuppet.io.motion.skeletons import read_animation
 from shadowpuppet.io.motion.table import dof_unit, motion_columns, table_columns, write_columns, write_joints
 from shadowpuppet.io.motion.trc import METRES, MISSING, write_trc
+from shadowpuppet.io.people import person_folders
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.animation import Animation
@@ -85,7 +87,8 @@ class Puppet(NamedTuple):
 
 def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | None = None, unit: str | None = None,
                missing: str = "nan", model: str = "rajagopal", weight: float | None = None) -> list[Path]:
-    """Write a run's motion as `<run>.<format>` for each of `formats`; returns the files' paths.
+    """Write a run's motion as `<run>.<format>` for each of `formats`; returns the files' paths. Of several people a file each,
+    `<run>-person-1.<format>`, ...
 
     The floor is at 0: a run whose world has it elsewhere (`Run.floor`) is raised. A killed run is exported up to its last frame. Warns of
     data that a format cannot hold. Raises a `ShadowPuppetError` for an unknown format, or a run that cannot be read, has no frame, or has
@@ -103,15 +106,18 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
     unknown = [name for name in formats if name not in EXPORTS]
     if unknown or not formats:
         raise SettingsError(f"formats: found {unknown[0] if unknown else 'none'!r}, expected some of {choices(EXPORTS)}")
-    layout = Layout.checked(unit, missing, model, weight)
-    export = _RunExport(_on_floor(read_run(folder)), layout)
-    if not np.isfinite(export.run.motion.joints).all(2).any():
+    layout, whole = Layout.checked(unit, missing, model, weight), Path(folder).resolve().name
+    people = {f"{whole}-{path.name}": path for path in person_folders(folder).values()} or {whole: Path(folder)}
+    exports = {name: _RunExport(_on_floor(read_run(path)), layout) for name, path in people.items()}
+    known = {name: export for name, export in exports.items() if np.isfinite(export.run.motion.joints).all(2).any()}
+    if not known:
         raise ShadowPuppetError(f"{folder}: found no frame with a known joint, expected one at least")
-    target = _made(Path(folder) / "export" if out is None else Path(out))
-    written = []
-    for name in dict.fromkeys(formats):
-        written.append(target / f"{Path(folder).resolve().name}.{name}")
-        FORMATS[name].write_run(export, written[-1])
+    for name in exports.keys() - known.keys():
+        warn(f"{name} is left out: it has no frame with a known joint")
+    target, written = _made(Path(folder) / "export" if out is None else Path(out)), []
+    for kind, (name, export) in product(dict.fromkeys(formats), known.items()):
+        written.append(target / f"{name}.{kind}")
+        FORMATS[kind].write_run(export, written[-1])
     return written
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import made_rig
 import numpy as np
 import pytest
 
@@ -134,6 +135,26 @@ def test_a_recording_without_calibration_is_placed_from_rough_toml(lab, tmp_path
     for camera, true in zip(found, exact):
         assert camera.matrix[0, 0] == pytest.approx(true.matrix[0, 0], rel=0.05)
         assert abs(camera.matrix[0, 0] / true.matrix[0, 0] - 1) > 1e-5  # it was solved, not copied
+
+
+def test_silent_films_that_begin_apart_are_put_in_step_while_cameras_are_placed(tmp_path):
+    exact, late, frames = made_rig.cameras(), (0, 4, 0, -3), 80
+    seen = made_rig.masks(exact, frames + 20)
+    folder = made_rig.write(tmp_path, exact, made_rig.shifted(seen, late, frames))
+    rng = np.random.default_rng(5)
+    write_calibration(folder / "calibration.toml", [moved(camera, rng) for camera in exact])
+    options = make_options({"masks": True, "height": TALL})
+    rig = open_rig(folder, options)
+    placed = place_cameras(rig, options)
+    found = np.array([placed.starts[camera.name] for camera in exact]) * made_rig.RATE
+    np.testing.assert_allclose(found - found.min(), np.array(late) + 3, atol=0.3)
+    assert np.nanmax(placed.fit.after) < 0.6
+    for a, b in ((0, 1), (0, 2), (1, 3)):
+        apart, true = (np.linalg.norm(cameras[a].centre - cameras[b].centre) for cameras in (placed.cameras, exact))
+        assert apart == pytest.approx(true, rel=0.04)
+    written = write_placed(rig, placed)
+    assert folder / "recording.toml" in written
+    assert place_cameras(open_rig(folder, options), options).starts == {}  # in step now
 
 
 def test_a_single_camera_is_refused(lab):

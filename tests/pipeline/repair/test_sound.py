@@ -96,7 +96,7 @@ def test_films_without_sound_and_with_a_rate_of_their_own_are_not_listened_to(tm
 
 def test_no_start_becomes_negative(still):
     rig = open_rig(still, MASKS)
-    moved = in_step(rig, heard_offsets(rig))
+    moved = in_step(rig, heard_offsets(rig).seconds)
     starts = [footage.view.start for footage in moved.footage]
     assert min(starts) == 0
     assert [view.start for view in moved.recording.views] == starts

@@ -113,8 +113,10 @@ def placed_table(placed: Placed, before: Sequence[Camera]) -> RenderableType:
                      f"{1000 * placed.place_doubt[n]:.0f} mm, {np.degrees(placed.angle_doubt[n]):.2f}°", *_field_of_view(placed, n)))
     what = (f"{placed.sets} sets of silhouettes, {placed.fit.tangents} pairs of tangents; lengths times {placed.scale:.3f}, floor "
             f"tilted by {np.degrees(placed.tilt):.1f}°")
+    late = ", ".join(f"{name} {seconds:.3f} s" for name, seconds in placed.starts.items())
+    facts = [("compared", what), *([("in step", f"films begin at {late} ([start] of recording.toml)")] if late else [])]
     columns = ("camera", "apart", "now", "moved", "turned", "within the rig to", *(["field of view"] if placed.focal_doubt.any() else []))
-    return Group(pairs([("compared", what)]), "", table("", columns, rows, right=(1, 2, 3, 4)))
+    return Group(pairs(facts), "", table("", columns, rows, right=(1, 2, 3, 4)))
 
 
 def _field_of_view(placed: Placed, n: int) -> Iterator[str]:

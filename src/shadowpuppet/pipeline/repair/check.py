@@ -183,11 +183,11 @@ def _with_times(rig: Rig, rows: Sequence[Row], found: Agreement, chosen: Sequenc
     return _Judgement(found, rotations, offsets, _certain(offsets, found))
 
 
-def aligned_sets(rows: Sequence[Row], shifts: Sequence[float]) -> list[Row]:
-    """`SETS_COMPARED` of the sets, evenly spread, in which camera k's silhouette is taken `shifts[k]` sets later."""
+def aligned_sets(rows: Sequence[Row], shifts: Sequence[float], count: int = SETS_COMPARED) -> list[Row]:
+    """Some of the sets, evenly spread, in which camera k's silhouette is taken `shifts[k]` sets later."""
     steps, F = [round(shift) for shift in shifts], len(rows)
     first, last = max(0, -min(steps)), F - 1 - max(0, *steps)
-    chosen = np.unique(np.linspace(first, max(first, last), SETS_COMPARED).astype(int))
+    chosen = np.unique(np.linspace(first, max(first, last), count).astype(int))
     return [[rows[f + step][k] if f + step < F else None for k, step in enumerate(steps)] for f in chosen.tolist()]
 
 

@@ -58,7 +58,7 @@ def check_films(rig: Rig, options: Options, listener: Listener | None = None) ->
     check = replace(judge_calibration(rig, sets), sound=heard)
     if heard is None or not _differs(heard, check):
         return Checked(check, sets, sets)
-    moved = in_step(rig, heard)
+    moved = in_step(rig, heard.seconds)
     again = gather_silhouettes(moved, options, listener)
     listener.begin("comparing")
     other = judge_calibration(moved, again)

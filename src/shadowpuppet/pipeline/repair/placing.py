@@ -12,18 +12,22 @@ import numpy as np
 from shadowpuppet.calibration.results import replace_calibration
 from shadowpuppet.calibration.silhouettes import Row
 from shadowpuppet.calibration.solve.tangency_bundle import ROUGH_FOCAL, TangencyFit, place_by_outlines
+from shadowpuppet.calibration.time_offset import time_offsets
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, evenly_spread, inverse, rigid, rotation_from_vector, unit
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
-from shadowpuppet.pipeline.repair.check import gather_silhouettes
+from shadowpuppet.pipeline.repair.check import SilhouetteSets, aligned_sets, gather_silhouettes
 from shadowpuppet.pipeline.repair.fix import write_notes
+from shadowpuppet.pipeline.repair.sound import heard_offsets, in_step
 from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 
 SETS = 90
 """Number of sets, over all of the films, whose outlines are compared."""
+ROUNDS, SAME_START = 10, 0.002
+"""Greatest number of times that cameras are placed and films put in step, in turn; least difference of starts, seconds, that is written."""
 STANDING = 80
 """Percentile of the heights of the visual hull that counts as the person's: walking and bending people are lower."""
 MAX_CROUCH = 1.03
@@ -63,6 +67,8 @@ class Placed:
     """Angle between the rough calibration's vertical and the floor's, rad."""
     advice: tuple[str, ...]
     """What to doubt, a sentence each; none if all is well."""
+    starts: dict[str, float]
+    """[start] of the recording by camera, seconds, as found; the earliest film begins when it did. Empty if all stay as they are."""
 
     @property
     def place_doubt(self) -> Array:
@@ -93,8 +99,9 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, 
     """The places and directions of cameras with rough places, from the person in their films; focal lengths, too, unless `rough_focal` is 0
     (see `place_by_outlines`).
 
-    The scale is the one at which the person is as tall as `options.height` or the recording's; without, the rough calibration's. Raises
-    `CalibrationError` if too little of the person is seen by two cameras at a time, or a camera's rough place is not known.
+    Films are put in step first, by their sound and then, as far as the rough places allow, by the silhouettes. The scale is the one at
+    which the person is as tall as `options.height` or the recording's; without, the rough calibration's. Raises `CalibrationError` if too
+    little of the person is seen by two cameras at a time, or a camera's rough place is not known.
     """
     if len(rig.cameras) < 2:
         raise CalibrationError(f"{rig.recording.path}: found one camera, expected two or more: outlines are compared")
@@ -102,17 +109,56 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, 
         if not camera.oriented:
             raise CalibrationError(f"camera {camera.name!r}: found only a field of view, expected also where it stands, roughly")
     listener = listener or Listener()
-    rows = compared_sets(rig, options, listener)
+    listener.begin("listening")
+    heard = heard_offsets(rig)
+    there = rig if heard is None else in_step(rig, heard.seconds)
+    sets = gather_silhouettes(there, options, listener, whole=True)
     listener.begin("placing the cameras")
-    fit = place_by_outlines(rig.cameras, rows, rough_focal=rough_focal)
+    fit, late = placed_in_step(there.cameras, sets, rough_focal)
+    if any(late):
+        there = in_step(there, [sets.every * steps / there.rate for steps in late])
+        sets = gather_silhouettes(there, options, listener, whole=True)
+        fit = place_by_outlines(there.cameras, chosen_sets(sets), rough_focal=rough_focal)
     listener.begin("floor and height")
-    return grounded(fit, rows, options.height or rig.recording.subject.height)
+    placed = grounded(fit, chosen_sets(sets), options.height or rig.recording.subject.height)
+    early = min(view.start for view in there.recording.views) - min(view.start for view in rig.recording.views)  # of the clock itself
+    starts = {view.camera.name: round(view.start - early, 4) for view in there.recording.views}
+    changed = any(abs(starts[view.camera.name] - view.start) > SAME_START for view in rig.recording.views)
+    return replace(placed, starts=starts) if changed else placed
 
 
-def compared_sets(rig: Rig, options: Options, listener: Listener) -> list[Row]:
-    """The silhouettes whose outlines are compared: `SETS` sets, spread over all of the films."""
-    rows = gather_silhouettes(rig, options, listener, whole=True).rows
-    return [rows[n] for n in evenly_spread(len(rows), SETS)]
+def placed_in_step(cameras: Sequence[Camera], sets: SilhouetteSets, rough_focal: float = 0.0) -> tuple[TangencyFit, list[float]]:
+    """The fit in which fewest tangents are far apart, and the sets by which each film is late there (0 for all if none is).
+
+    Cameras are placed, delays estimated as seen from there, and both again with the films shifted: a wrong place turns a tangent by a
+    nearly constant angle, which delays do not depend on, so that both converge. Where that fails it is begun once more with the delays as
+    seen from the rough places.
+    """
+    best = dict[tuple[int, ...], tuple[TangencyFit, Array]]()
+    for seen_from in ((), cameras):
+        shifts = _shifts(seen_from, sets)
+        for _ in range(ROUNDS):
+            steps = tuple(np.rint(shifts).astype(int).tolist())
+            if steps in best:
+                break
+            fit = place_by_outlines(cameras, aligned_sets(sets.rows, steps, SETS), rough_focal=rough_focal)
+            shifts = _shifts(fit.cameras, sets)
+            best[steps] = fit, shifts
+        if min(fit.far for fit, _ in best.values()) < MANY_FAR:
+            break
+    steps = min(best, key=lambda steps: best[steps][0].far)
+    fit, shifts = best[steps]
+    return fit, (np.where(np.abs(shifts - steps) < 1, shifts, steps) if any(steps) else np.zeros(len(steps))).tolist()
+
+
+def _shifts(cameras: Sequence[Camera], sets: SilhouetteSets) -> Array:
+    """Sets (C,) by which films are late as seen from cameras; 0 where that is not known, and without cameras."""
+    return np.array([late or 0.0 for late in time_offsets(cameras, sets.rows).frames] if cameras else np.zeros(len(sets.rows[0])))
+
+
+def chosen_sets(sets: SilhouetteSets) -> list[Row]:
+    """The silhouettes whose outlines are compared: `SETS` sets, spread over all."""
+    return [sets.rows[n] for n in evenly_spread(len(sets.rows), SETS)]
 
 
 def grounded(fit: TangencyFit, rows: Sequence[Row], height: float | None) -> Placed:
@@ -120,7 +166,7 @@ def grounded(fit: TangencyFit, rows: Sequence[Row], height: float | None) -> Pla
     ends, advice = _ends(fit.cameras, rows), list[str]()
     if ends is None:
         advice.append("floor and scale are the rough calibration's: the person is hardly ever whole in two pictures")
-        return _with_doubts(Placed(cameras=fit.cameras, fit=fit, sets=len(rows), scale=1.0, tilt=0.0, advice=tuple(advice)))
+        return _with_doubts(Placed(cameras=fit.cameras, fit=fit, sets=len(rows), scale=1.0, tilt=0.0, advice=tuple(advice), starts={}))
     level, tilt = _floor(ends)
     usual, tall = np.percentile(_above(level, ends.top), [50, STANDING])
     if height is None:
@@ -129,7 +175,7 @@ def grounded(fit: TangencyFit, rows: Sequence[Row], height: float | None) -> Pla
         advice.append(f"the scale is rough: the person bends in most of the film ({usual:.2f} m high, {tall:.2f} when upright)")
     scale = 1.0 if height is None else height / float(tall)
     return _with_doubts(Placed(cameras=tuple(_seen_from(camera, level, scale) for camera in fit.cameras), fit=fit, sets=len(rows),
-                               scale=scale, tilt=tilt, advice=tuple(advice)))
+                               scale=scale, tilt=tilt, advice=tuple(advice), starts={}))
 
 
 def _with_doubts(placed: Placed) -> Placed:
@@ -234,4 +280,5 @@ def write_placed(rig: Rig, placed: Placed, path: Path | None = None) -> list[Pat
     placings = {camera.name: (camera, old) for camera, old in zip(placed.cameras, rig.cameras)}
     written = replace_calibration(path, [_replaced(view.camera, *placings.get(view.camera.name, (view.camera, view.camera)))
                                          for view in rig.recording.views])
-    return [*written, *(write_notes(rig.recording.path / "recording.toml", {"calibration": None}) if own else [])]
+    notes = {"calibration": None, **({"start": placed.starts} if placed.starts else {})}
+    return [*written, *(write_notes(rig.recording.path / "recording.toml", notes) if own else [])]

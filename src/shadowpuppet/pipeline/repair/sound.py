@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -41,10 +42,9 @@ def _sound_of(footage: Footage) -> Sound | None:
         return None  # a picture, or a film that the look reports
 
 
-def in_step(rig: Rig, heard: SoundOffsets) -> Rig:
-    """The rig with each film's start moved by what is heard; no start becomes negative."""
-    late = [value or 0.0 for value in heard.seconds]
-    starts = [footage.view.start + value for footage, value in zip(rig.footage, late)]
+def in_step(rig: Rig, late: Sequence[float | None]) -> Rig:
+    """The rig with each film's start moved by the seconds by which it is late; no start becomes negative."""
+    starts = [footage.view.start + (value or 0.0) for footage, value in zip(rig.footage, late)]
     least = min(0.0, *starts)
     moved = {footage.camera.name: start - least for footage, start in zip(rig.footage, starts)}
     views = tuple(replace(view, start=moved.get(view.camera.name, view.start)) for view in rig.recording.views)

@@ -36,12 +36,13 @@ UNSTATED = ("This run states no standard deviations. For “particles” and “
             "from the pose before it; the ellipsoids tell how far those particles are spread, no measure of how far off the pose is.")
 
 
-def run_scene(folder: str | Path, truth: str | Path | None = None, recording: str | Path | None = None) -> Scene:
-    """The scene of a run folder; `truth` and `recording` replace those that it names. Raises a `ShadowPuppetError`.
+def run_scene(folder: str | Path, truth: str | Path | None = None, recording: str | Path | None = None, *, films: bool = True) -> Scene:
+    """The scene of a run folder; `truth` and `recording` replace those that it names; without `films` the cameras are those that the folder
+    keeps. Raises a `ShadowPuppetError`.
 
     Files that it names and that are gone are left out and named in `problems`.
     """
-    return _Run(read_run(folder), truth, recording).scene()
+    return _Run(read_run(folder), truth, recording, films).scene()
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,7 @@ class _Run:
     run: Run
     truth: str | Path | None
     recording: str | Path | None
+    with_films: bool = True
 
     def scene(self) -> Scene:
         motion, problems = self.run.motion, list[str]()
@@ -63,9 +65,9 @@ class _Run:
         figures = [estimate]
         if measured is not None and measured.truth is not None:
             figures.append(joint_figure("truth", measured.truth, "truth"))
-        with_films = self.film_cameras if self.recording else self._tried(problems, "the films are not shown", lambda: self.film_cameras)
-        films = with_films is not None
-        cameras = with_films if with_films is not None else self.kept_cameras
+        filmed = self.film_cameras if self.recording else self._tried(problems, "the films are not shown", lambda: self.film_cameras)
+        films = filmed is not None
+        cameras = filmed if filmed is not None else self.kept_cameras
         cloud = self._tried(problems, "particles are not shown", lambda: self.rerun(cameras)) if films and body is not None else None
         charts = [*(errors_of(measured) if measured is not None else ()), *fit_of(motion), *angles_of(motion)]
         return Scene(title=self.name, times=motion.times, figures=tuple(figures), cameras=cameras, charts=tuple(charts), facts=self.facts,
@@ -119,7 +121,9 @@ class _Run:
 
     @cached_property
     def film_cameras(self) -> tuple[SceneCamera, ...] | None:
-        """The cameras that were used, with their films; None if the run names no recording."""
+        """The cameras that were used, with their films; None if these are not wanted, or the run names no recording."""
+        if not self.with_films:
+            return None
         kept = self.run.folder / "recording"  # of a live run with --record
         path = self.recording or self.run.info.get("recording") or (kept if kept.exists() else None)
         if path is None:

@@ -10,10 +10,12 @@ import numpy as np
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices
 from shadowpuppet.io.calibration.formats import find_calibration, is_calibration
 from shadowpuppet.io.motion import READABLE
+from shadowpuppet.io.people import person_folders
 from shadowpuppet.io.prior import FORMAT
 from shadowpuppet.io.recording import is_recording
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.viewer.scene.of_file import calibration_scene, motion_scene
+from shadowpuppet.viewer.scene.of_people import people_scene
 from shadowpuppet.viewer.scene.of_prior import prior_scene
 from shadowpuppet.viewer.scene.of_recording import recording_scene
 from shadowpuppet.viewer.scene.of_run import run_scene
@@ -29,6 +31,11 @@ def open_scene(path: str | Path, options: Options | None = None, truth: Path | N
     if not path.exists():
         raise FormatError(f"{path}: no such file or folder; a run, a recording, a film with --fov, a calibration, a prior (.npz) or a "
                           f"file of motion ({choices(READABLE)}) can be shown")
+    if people := person_folders(path):
+        if truth is not None:
+            raise ShadowPuppetError(f"{path}: truth: found {truth}, expected none: it is a run of several people; view "
+                                    f"{next(iter(people.values()))} for one of them")
+        return people_scene(path, people, recording)
     if (path / "run.toml").exists():
         return run_scene(path, truth, recording)
     for name, value in (("truth", truth), ("recording", recording)):

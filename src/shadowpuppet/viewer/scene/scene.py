@@ -95,6 +95,8 @@ class Figure:
     """Which limbs are not vouched for; None: all are."""
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Offset at which it is drawn, metres."""
+    tint: tuple[int, int, int] | None = None
+    """Colour mixed into the mesh's, 0..255, in place of its kind's: one of several people."""
 
     def at(self, time: float) -> int | None:
         """Frame to be shown at a time, seconds; None if none is near enough or no joint is known in it."""

@@ -22,6 +22,8 @@ COLOURS = {"truth": (64, 196, 122), "other": None, "mean": None, "estimate": Non
 """Colours by kind of figure; None: those of the mesh, left warm and right blue."""
 BLENDED = {"estimate": ((40, 50, 70), 0.3), "other": ((150, 98, 196), 0.55), "mean": ((150, 156, 164), 0.35)}
 """Colours mixed into those of a kind, and their share: those of the mesh are too pale for a white page."""
+TINT = 0.5
+"""Share of a person's own tint."""
 BY_CAMERA = np.array([(0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233), (213, 94, 0), (240, 228, 66)], np.uint8)
 """Colours of cameras (Okabe and Ito 2008) and of the hull points on their contours."""
 TRANSPARENT_OPACITY = 0.75
@@ -56,7 +58,7 @@ class FigureNodes:
             made = partial(
                 server.scene.add_mesh_skinned, vertices=mesh.points[points].astype(np.float32), faces=faces.astype(np.uint32),
                 skin_weights=weights, bone_wxyzs=np.tile([1.0, 0, 0, 0], (len(joints), 1)),
-                bone_positions=figure.rest[joints].astype(np.float32), color=colour_of(figure.kind, np.array(colour)),
+                bone_positions=figure.rest[joints].astype(np.float32), color=colour_of(figure.kind, np.array(colour), figure.tint),
                 side="double" if mesh.two_sided else "front", cast_shadow=False, receive_shadow=False)  # fmt: skip
             ever = figure.doubtful is not None and bool(figure.doubtful.frames[:, int(limb)].any())
             pale = made(f"{name}/{k} pale", opacity=PALE_OPACITY, visible=False) if ever else None
@@ -150,13 +152,13 @@ def unit_sphere(count: int = 120) -> tuple[NDArray[np.float32], NDArray[np.uint3
     return points.astype(np.float32), np.where(outward[:, None], faces, faces[:, ::-1]).astype(np.uint32)
 
 
-def colour_of(kind: str, linear: Array) -> tuple[int, int, int]:
-    """Colour 0..255 for a mesh colour (linear RGB) of a kind of figure."""
+def colour_of(kind: str, linear: Array, tint: tuple[int, int, int] | None = None) -> tuple[int, int, int]:
+    """Colour 0..255 for a mesh colour (linear RGB) of a kind of figure, or of a person with a tint of their own."""
     fixed = COLOURS.get(kind)
     if fixed is not None:
         return fixed
     own = 255 * np.clip(linear, 0, 1) ** (1 / 2.2)
-    mixed, share = BLENDED.get(kind, ((0, 0, 0), 0.0))
+    mixed, share = (tint, TINT) if tint is not None else BLENDED.get(kind, ((0, 0, 0), 0.0))
     red, green, blue = ((1 - share) * own + share * np.array(mixed)).round().astype(int).tolist()
     return red, green, blue
 

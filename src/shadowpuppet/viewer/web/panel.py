@@ -211,7 +211,8 @@ class Panel:
         for figure in self.scene.figures:
             n = figure.at(now) if figure.status is None else int(np.abs(figure.times - now).argmin())
             if n is not None and figure.status is not None:
-                words.append(str(figure.status[n]) + (f", overlap {figure.overlap[n]:.2f}" if figure.overlap is not None
+                who = "" if figure.tint is None else f"{figure.name}: "
+                words.append(who + str(figure.status[n]) + (f", overlap {figure.overlap[n]:.2f}" if figure.overlap is not None
                                                       and np.isfinite(figure.overlap[n]) else ""))  # fmt: skip
                 words += [f"{' and '.join(limbs)} doubtful"] if figure.doubtful is not None and (limbs := figure.doubtful.named(n)) else []
         words += [f"{chart.name} {_value(chart, now)}" for chart in self.scene.charts if chart.name == "error" and _value(chart, now)]

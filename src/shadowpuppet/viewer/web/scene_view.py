@@ -141,12 +141,10 @@ class SceneView:
         return self.scene.cloud(time) if wanted and self.scene.cloud is not None else None
 
     def _stated(self, time: float) -> Ellipsoids | None:
-        """The uncertainty stated by the run at a time, s; None if it is not shown or not stated."""
-        for figure in self.scene.figures if self.options.uncertainty else ():
-            n = figure.at(time) if figure.kind == "estimate" else None
-            if n is not None and (stated := figure.uncertainty(n)) is not None:
-                return stated
-        return None
+        """The uncertainty stated by the run, of all people, at a time, s; None if it is not shown or not stated."""
+        own = [figure for figure in self.scene.figures if figure.kind == "estimate"] if self.options.uncertainty else []
+        stated = [found for figure in own if (n := figure.at(time)) is not None and (found := figure.uncertainty(n)) is not None]
+        return Ellipsoids(*map(np.concatenate, zip(*stated))) if stated else None
 
     def _put_hull(self, hull: HullPoints | None) -> None:
         if hull is None or not len(hull.points):
