@@ -79,6 +79,18 @@ def test_doubtful_steps_are_left_out_but_not_for_a_moments_doubt():
     assert gait_of(table, sure=~moment).left_out == whole.left_out
 
 
+def test_a_strike_that_a_gap_hides_is_none():
+    _, table = walks()
+    whole = gait_of(table)
+    hidden = table.positions.copy()
+    strike = whole.counted[8].end
+    hidden[(table.times > strike - 0.05) & (table.times < strike + 0.08)] = np.nan
+    gait = gait_of(replace(table, positions=hidden))
+    assert gait.left_out["doubtful"] >= 2
+    assert len(gait.counted) >= len(whole.counted) - 4
+    assert np.ptp([each.seconds for each in gait.strides]) <= np.ptp([each.seconds for each in whole.strides]) + 0.04
+
+
 def test_a_step_with_a_pause_is_left_out_and_counted():
     _, table = walks()
     both_stand = np.flatnonzero(table.times > gait_of(table).counted[8].end)[4]

@@ -28,6 +28,8 @@ MOST_TURN = np.radians(45)
 """Turn of the pelvis' way from one step to the next (rad) above which it is a turn, not a bend."""
 MOST_DOUBT = 0.2
 """Share of a step's frames up to which its legs need not be vouched for: as legs pass each other, they hide one another for a moment."""
+SEEN = 0.2
+"""Seconds before and after a step in which no frame may be without a pose: a strike at the end of a gap is none."""
 REASONS = ("doubtful", "paused", "on the spot", "turning", "at an end")
 """Why a step is left out: its legs are not vouched for; the rest as above; the film begins or ends within a step of it."""
 
@@ -123,7 +125,8 @@ def _step(before: Stance, stance: Stance, times: Array, pelvis: Array, sure: NDA
     way = float(np.hypot(*ways[0]))
     within = (times >= before.strike) & (times <= stance.strike)
     turn = float(np.angle(complex(*ways[2]) / complex(*ways[1]))) if min(np.hypot(*ways[1]), np.hypot(*ways[2])) > 0 else 0.0
-    known = np.isfinite([*stance.place, *before.place, *a, *c]).all()
+    near = (times >= before.strike - SEEN) & (times <= stance.strike + SEEN)
+    known = np.isfinite([*stance.place, *before.place]).all() and np.isfinite(pelvis[near]).all()
     reasons = (not known or sure[within].mean() < 1 - MOST_DOUBT, seconds > LONGEST_STEP, way < LEAST_WAY, abs(turn) > MOST_TURN,
                middle - seconds < times[0] or middle + seconds > times[-1])
     left_out = next((reason for reason, is_so in zip(REASONS, reasons) if is_so), "")
