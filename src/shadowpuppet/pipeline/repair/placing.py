@@ -132,7 +132,7 @@ def placed_in_step(cameras: Sequence[Camera], sets: SilhouetteSets, rough_focal:
 
     Cameras are placed, delays estimated as seen from there, and both again with the films shifted: a wrong place turns a tangent by a
     nearly constant angle, which delays do not depend on, so that both converge. Where that fails it is begun once more with the delays as
-    seen from the rough places.
+    seen from the rough places. Raises `CalibrationError` as `place_by_outlines`.
     """
     best = dict[tuple[int, ...], tuple[TangencyFit, Array]]()
     for seen_from in ((), cameras):
@@ -141,7 +141,12 @@ def placed_in_step(cameras: Sequence[Camera], sets: SilhouetteSets, rough_focal:
             steps = tuple(np.rint(shifts).astype(int).tolist())
             if steps in best:
                 break
-            fit = place_by_outlines(cameras, aligned_sets(sets.rows, steps, SETS), rough_focal=rough_focal)
+            try:
+                fit = place_by_outlines(cameras, aligned_sets(sets.rows, steps, SETS), rough_focal=rough_focal)
+            except CalibrationError:
+                if not best:
+                    raise
+                break  # shifted so, the films have too little in common
             shifts = _shifts(fit.cameras, sets)
             best[steps] = fit, shifts
         if min(fit.far for fit, _ in best.values()) < MANY_FAR:
