@@ -10,7 +10,7 @@ import pytest
 import runs
 from measured import NAMES, TRUTH, moved, run_that_errs, write_run
 
-from shadowpuppet.evaluation.error_metrics import aligned_distances
+from shadowpuppet.evaluation.error_metrics import aligned_distances, hinge_angles
 from shadowpuppet.evaluation.evaluation import Evaluation, measure_run
 from shadowpuppet.evaluation.report import charts
 from shadowpuppet.evaluation.report.charts import BLUE, GREEN, PINK, STATUSES
@@ -164,6 +164,18 @@ def test_overlap_and_cost(tmp_path, drawn, several, scale, unit):
     np.testing.assert_allclose(above.get_ylim(), (0.9 - 0.059 - 0.05, 1), atol=1e-6)
     assert below.get_ylim()[0] == 0
     assert above.get_xlim() == below.get_xlim() == pytest.approx((0, 59 / 15))
+
+
+def test_differences_of_bends_with_their_mean_and_limits(of, drawn):
+    figure = charts.bland_altman(of)
+    elbow = next(axes for axes in figure.axes if axes.get_title(loc="left") == "elbow")
+    points, mean, low, high = (line for line in elbow.lines if line.get_color() == GREEN)
+    angles = hinge_angles(of.table, of.truth)["left_elbow"]
+    off = angles[0] - angles[1]
+    np.testing.assert_allclose(xy(points), np.column_stack([angles.mean(0), off]))
+    measured = of.measured["bends_deg"]["left_elbow"]
+    assert mean.get_ydata()[0] == pytest.approx(measured["bias"])
+    assert (high.get_ydata()[0] - low.get_ydata()[0]) / 2 == pytest.approx(1.96 * measured["aligned"])
 
 
 def test_angles_with_their_intervals(tmp_path, drawn):

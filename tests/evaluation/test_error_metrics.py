@@ -179,7 +179,7 @@ def test_an_elbow_is_as_far_bent_as_it_is():
         return JointTable(np.zeros(1), ("left_shoulder", "left_elbow", "left_wrist"), np.array([[[0, 0, 0], [0.3, 0, 0], wrist]]))
 
     found = hinge_errors(arm(np.radians(100)), arm(np.radians(70)))
-    assert found == {"left_elbow": pytest.approx({"bias": 30, "mean": 30, "rmse": 30})}
+    assert found == {"left_elbow": pytest.approx({"bias": 30, "mean": 30, "rmse": 30, "aligned": 0})}
     assert hinge_errors(arm(np.pi), arm(0.0))["left_elbow"]["mean"] == pytest.approx(180)
 
 
@@ -237,6 +237,6 @@ def test_an_angle_that_went_round_once_more_has_no_error():
     d = skeleton.dof_names.index(name)
     round_once[:, d] = 2 * np.pi + np.radians([10, -10, 10, -10, 10])
     found = dof_errors(skeleton, round_once, poses)
-    assert found[name] == pytest.approx({"bias": 2, "mean": 10, "rmse": 10})
+    assert found[name] == pytest.approx({"bias": 2, "mean": 10, "rmse": 10, "aligned": np.sqrt(96)})
     assert found["right_knee_flexion"]["mean"] == 0
     assert not [n for n in found if skeleton.dofs[skeleton.dof_names.index(n)].kind != "rotation"]

@@ -75,7 +75,8 @@ def images(text: str) -> list[np.ndarray]:
 @pytest.fixture
 def quick(monkeypatch):
     """Pages without their plots, where those are not what is tested."""
-    for name in ("over_time", "by_joint_and_time", "by_joint", "shares", "path_of", "jitter_by_joint", "fit_over_time", "coverage_chart"):
+    for name in ("over_time", "by_joint_and_time", "by_joint", "shares", "path_of", "jitter_by_joint", "fit_over_time", "coverage_chart",
+                 "bland_altman"):
         monkeypatch.setattr(f"shadowpuppet.evaluation.report.charts.{name}", lambda *_: "<svg></svg>")
 
 

@@ -35,8 +35,9 @@ MEASURED = {
     "clock": {"run_hz": 25.0, "truth_hz": 59.94, "frames_compared": 60, "offset_s": -0.4, "rival_s": 1.2},
     "bone_errors": {"left_hip-left_knee": {"run_mm": 412.34, "truth_mm": 402.3, "longer_mm": 10.04, "run_sd_mm": 0.005, "truth_sd_mm": 0.5},
                     "neck-head": {"run_mm": 100.0, "truth_mm": 120.0, "longer_mm": -20.0, "run_sd_mm": 0.25, "truth_sd_mm": 0.125}},
-    "bends_deg": {"left_knee": {"bias": -3.14, "mean": 4.0, "rmse": 5.55}},
-    "angles_deg": {"left_hip": 4.44, "all": 5.55}, "dofs_deg": {"left_knee_flexion": {"bias": 1.0, "mean": 2.0, "rmse": 3.0}},
+    "bends_deg": {"left_knee": {"bias": -3.14, "mean": 4.0, "rmse": 5.55, "aligned": 4.56}},
+    "angles_deg": {"left_hip": 4.44, "all": 5.55}, "angles_aligned_deg": {"left_hip": 3.33, "all": 2.22},
+    "dofs_deg": {"left_knee_flexion": {"bias": 1.0, "mean": 2.0, "rmse": 3.0, "aligned": 2.5}},
     "status": {"tracked": 50, "lost": 7, "absent": 3}, "frames": 60, "limb_status": None, "feet": {},
 }  # fmt: skip
 
@@ -109,9 +110,10 @@ def test_tables():
     assert cells(body) == [
         ["", "run", "truth", "longer", "run&#x27;s sd", "truth&#x27;s sd"],
         ["left hip to left knee", "412.3", "402.3", "+10.0", "0.01", "0.50"], ["neck to head", "100.0", "120.0", "-20.0", "0.25", "0.12"],
-        ["", "run less truth", "mean size", "rmse"], ["left knee", "-3.1", "4.0", "5.5"],
-        ["", "rmse"], ["left hip", "4.4"], ["all", "5.5"],
-        ["", "run less truth", "mean size", "rmse"], ["left knee flexion", "+1.0", "2.0", "3.0"],
+        ["", "run less truth", "mean size", "rmse", "without the mean"], ["left knee", "-3.1", "4.0", "5.5", "4.6"],
+        ["", "rmse", "frames aligned"], ["left hip", "4.4", "3.3"], ["all", "5.5", "2.2"],
+        ["", "run less truth", "mean size", "rmse", "without the mean"],
+        ["left knee flexion", "+1.0", "2.0", "3.0", "2.5"],
     ]  # fmt: skip
     assert re.findall(r"<tr class=sum><td>(.*?)</td>", body) == ["all"]
     assert rows([("a",), ("b",), ("c",)], sums=1) == "<tr><td>a</td></tr><tr><td>b</td></tr><tr class=sum><td>c</td></tr>"

@@ -105,8 +105,8 @@ def test_every_picture_is_worked_on_or_counted_as_dropped(played):
 def test_the_folder_tells_how_it_was_made_and_keeps_no_picture(played, film):
     run = played[0]
     names = {path.name for path in run.folder.iterdir()}
-    assert names == {"raw.csv", "joints.csv", "angles.csv", "intervals.csv", "motion.npz", "run.toml", "metrics.json", "person.toml",
-                     "calibration.toml"}
+    assert names == {"raw.csv", "joints.csv", "angles.csv", "angles.toml", "intervals.csv", "motion.npz", "run.toml", "metrics.json",
+                     "person.toml", "calibration.toml"}
     assert run.info["camera"] == str(film)
     assert run.info["live"]["countdown"] == 0.2
     assert run.info["smoothing"]["method"] == "tracker"

@@ -16,6 +16,7 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
              offset: float = 0.0, sync: Switch = False, align: Switch = False, angles: Switch = False,
              file: Annotated[Path | None, output("File that gets all figures (.json).")] = None,
              report: Annotated[Path | None, flag("File that gets a page with plots and pictures (.html); needs matplotlib.")] = None,
+             movement: Annotated[Path | None, flag("File that gets steps, and angles over the gait cycle or their ranges (.csv).")] = None,
              update: Annotated[bool, switch("Also put the figures into the run's own metrics.json.")] = False,
              quiet: Quiet = False, as_json: AsJson = False) -> None:  # fmt: skip
     """Evaluate a run: errors of joints and motion against a truth, overlap, cost, jitter, frames without a pose.
@@ -43,6 +44,7 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     """
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.evaluation.evaluation import Comparison, check_output, measure_run, update_metrics, write_evaluation
+    from shadowpuppet.evaluation.movement.movement import movement_of, write_movement
     from shadowpuppet.evaluation.report.page import check_report, write_report
     from shadowpuppet.io.people import person_folders
 
@@ -51,8 +53,10 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
         check_output(file, run, ".json")
     if report is not None:
         check_report(report, run)
+    if movement is not None:
+        check_output(movement, run, ".csv")
     if person_folders(run):
-        return _of_people(run, truth, file, report, update, quiet, as_json)
+        return _of_people(run, truth, file, report, movement, update, quiet, as_json)
     written = {}
     with terminal(quiet or as_json) as listener:
         listener.begin("measuring")
@@ -60,6 +64,9 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
         if file is not None:
             write_evaluation(file, found.measured, run)
             written["figures"] = file
+        if movement is not None:
+            write_movement(movement, movement_of(found.run))
+            written["movement"] = movement
         if update:
             written["updated"] = update_metrics(found)
         if report is not None:
@@ -72,14 +79,16 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
         show(*_tables(found.measured), pairs([*_rows(found.measured), *((name, str(path)) for name, path in written.items())]))
 
 
-def _of_people(run: Path, truth: Path | None, file: Path | None, report: Path | None, update: bool, quiet: bool, as_json: bool) -> None:
+def _of_people(run: Path, truth: Path | None, file: Path | None, report: Path | None, movement: Path | None, update: bool, quiet: bool,
+               as_json: bool) -> None:
     """Evaluate a run of several people."""
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.errors import SettingsError
     from shadowpuppet.evaluation.evaluation import write_evaluation
     from shadowpuppet.evaluation.people import measure_people
 
-    if wrong := next((name for name, given in (("TRUTH", truth), ("--report", report), ("--update", update)) if given), None):
+    if wrong := next((name for name, given in (("TRUTH", truth), ("--report", report), ("--movement", movement),
+                                                  ("--update", update)) if given), None):
         raise SettingsError(f"{wrong}: found it for a run of several people, expected it for one of them, such as {run / 'person-1'}")
     with terminal(quiet or as_json) as listener:
         listener.begin("measuring")
@@ -112,7 +121,9 @@ def _tables(measured: Mapping[str, Any]) -> Iterator[Any]:
         yield table("mean error (MPJPE), mm, after alignment", ("", "mm"),
                     ((text.format(root=root_text(aligned)), f"{aligned[way]:.1f}") for way, text in WAYS.items() if way in aligned))
     if "angles_deg" in measured:
-        yield table("", ("turned at", "by degrees, rmse"), ((name, f"{value:.1f}") for name, value in measured["angles_deg"].items()))
+        aligned = measured["angles_aligned_deg"]
+        yield table("", ("turned at", "by degrees, rmse", "frames aligned"),
+                    ((name, f"{value:.1f}", f"{aligned[name]:.1f}") for name, value in measured["angles_deg"].items()))
 
 
 def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -122,6 +133,7 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         coverage_text,
         exchanges_text,
         feet_text,
+        gait_text,
         losses_text,
         world_text,
     )
@@ -129,6 +141,8 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "no pose", losses_text(measured["losses"])
     if feet := feet_text(measured["feet"]):
         yield "feet", feet
+    if gait := gait_text(measured["gait"]):
+        yield "gait", gait
     if "errors" not in measured:
         return
     yield "clock", clock_text(measured["clock"])

@@ -108,14 +108,25 @@ def humaneva_error(run: JointTable, truth: JointTable) -> dict[str, Any]:
 
 
 def hinge_errors(run: JointTable, truth: JointTable) -> dict[str, dict[str, float]]:
-    """Errors of the angles of elbows and knees, degrees: mean, mean absolute value and root mean square."""
+    """Errors of the angles of elbows and knees, degrees: mean, mean absolute value and root mean square;
+    `aligned`: that without the mean."""
+    found = {}
+    for name, (ours, theirs) in hinge_angles(run, truth).items():
+        off = ours - theirs
+        found[name] = {"bias": float(off.mean()), "mean": float(np.abs(off).mean()), "rmse": float(np.sqrt((off**2).mean())),
+                       "aligned": float(off.std())}
+    return found
+
+
+def hinge_angles(run: JointTable, truth: JointTable) -> dict[str, Array]:
+    """How far elbows and knees are bent in run and truth, degrees, each (2, N), in the frames in which both are known."""
     found = {}
     for name, chain in HINGES.items():
         if {*chain} <= {*run.names} & {*truth.names}:
-            off = np.degrees(_bend(run.select(chain)) - _bend(truth.select(chain)))
-            off = off[np.isfinite(off)]
-            if len(off):
-                found[name] = {"bias": float(off.mean()), "mean": float(np.abs(off).mean()), "rmse": float(np.sqrt((off**2).mean()))}
+            both = np.degrees([_bend(table.select(chain)) for table in (run, truth)])
+            known = np.isfinite(both).all(0)
+            if known.any():
+                found[name] = both[:, known]
     return found
 
 

@@ -26,6 +26,7 @@ from shadowpuppet.evaluation.error_metrics import (
 from shadowpuppet.evaluation.exchanges import exchanges
 from shadowpuppet.evaluation.interval_coverage import coverage
 from shadowpuppet.evaluation.joint_angles import compared_poses, dof_errors, turn_errors
+from shadowpuppet.evaluation.movement.movement import gait_summary
 from shadowpuppet.evaluation.standing import standing_figures
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.contacts import read_contacts
@@ -89,7 +90,7 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
         raise ShadowPuppetError(f"{folder}: {asked}: found no truth to compare with, expected one as TRUTH")
     cameras = _cameras(run.folder)
     info: dict[str, Any] = {"run": str(folder), "truth": None if table is None else str(table), "complete": run.complete}
-    lost = {"losses": pose_losses(run.motion)}
+    lost = {"losses": pose_losses(run.motion), "gait": gait_summary(run)}
     if table is None:
         measured = evaluate(run.motion, joints=_joint_names(how.joints), camera=_single_camera(cameras), cameras=max(len(cameras), 1))
         return Evaluation(run, info | measured | lost | {"feet": standing_figures(run.motion.table)}, cameras)
@@ -110,7 +111,8 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
     measured["feet"] = standing_figures(run.motion.table, reference, flags)
     if how.angles:
         poses = compared_poses(run.motion, theirs)
-        measured |= {"angles_deg": turn_errors(*poses), "dofs_deg": dof_errors(*poses)}
+        measured |= {"angles_deg": turn_errors(*poses), "angles_aligned_deg": turn_errors(*poses, aligned=True),
+                     "dofs_deg": dof_errors(*poses)}
     return Evaluation(run, info | measured, cameras, ours, theirs, errors)
 
 

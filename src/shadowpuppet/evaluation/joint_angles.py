@@ -14,6 +14,9 @@ from shadowpuppet.motion.synchronization import match
 UNOBSERVABLE = ("head", "_ankle")
 """Endings of the names of joints whose rotation is not determined by the joints' positions."""
 
+ALIGNMENTS = 50
+"""Rounds in which both constant turns are found."""
+
 
 def compared_poses(motion: Motion, truth: JointTable, start: int = 0) -> tuple[Skeleton, Array, Array]:
     """The skeleton, and the run's and the truth's poses (N, D) of the frames in which both are known.
@@ -30,22 +33,26 @@ def compared_poses(motion: Motion, truth: JointTable, start: int = 0) -> tuple[S
     return fitted.body.skeleton, ours[known], theirs[known]
 
 
-def turn_errors(skeleton: Skeleton, ours: Array, theirs: Array) -> dict[str, float]:
+def turn_errors(skeleton: Skeleton, ours: Array, theirs: Array, aligned: bool = False) -> dict[str, float]:
     """Root mean square angle between the rotations of each joint in poses (N, D), degrees, and of `all`.
 
     One angle a joint, of the whole rotation; it includes the twist of a straight limb, which joints do not show. Heads and ankles are left
-    out.
+    out. `aligned`: after the constant turns of both bones' frames that bring run and truth nearest to each other, which are a matter of
+    how frames are defined, in the manner of REFRAME.
     """
-    turns = [_local_rotations(skeleton, poses) for poses in (ours, theirs)]
     kept = [j for j, joint in enumerate(skeleton.joints) if not joint.name.endswith(UNOBSERVABLE)]
-    cosine = (np.einsum("njab,njab->nj", *turns)[:, kept] - 1) / 2
+    turns = [_local_rotations(skeleton, poses)[:, kept] for poses in (ours, theirs)]
+    if aligned:
+        turns[0] = np.stack([frame_aligned(a, b) for a, b in zip(*(each.swapaxes(0, 1) for each in turns))], axis=1)
+    cosine = (np.einsum("njab,njab->nj", *turns) - 1) / 2
     squares = np.degrees(np.arccos(np.clip(cosine, -1, 1))) ** 2
     by_joint = dict(zip((skeleton.joints[j].name for j in kept), np.sqrt(squares.mean(0)).tolist(), strict=True))
     return by_joint | {"all": float(np.sqrt(squares.mean()))}
 
 
 def dof_errors(skeleton: Skeleton, ours: Array, theirs: Array) -> dict[str, dict[str, float]]:
-    """Errors of each angle of poses (N, D), degrees, wrapped, as in Fig. 7 of Ni 2008: mean, mean absolute value, RMS.
+    """Errors of each angle of poses (N, D), degrees, wrapped, as in Fig. 7 of Ni 2008: mean, mean absolute value, RMS; `aligned`: RMS
+    without the mean.
 
     Translations, components of rotation vectors, heads and ankles are left out.
     """
@@ -53,8 +60,25 @@ def dof_errors(skeleton: Skeleton, ours: Array, theirs: Array) -> dict[str, dict
     for d, dof in enumerate(skeleton.dofs):
         if dof.kind == "rotation" and not dof.joint.endswith(UNOBSERVABLE):
             off = np.degrees(wrapped(ours[:, d] - theirs[:, d]))
-            found[dof.name] = {"bias": float(off.mean()), "mean": float(np.abs(off).mean()), "rmse": float(np.sqrt((off**2).mean()))}
+            found[dof.name] = {"bias": float(off.mean()), "mean": float(np.abs(off).mean()), "rmse": float(np.sqrt((off**2).mean())),
+                               "aligned": float(off.std())}
     return found
+
+
+def frame_aligned(ours: Array, theirs: Array) -> Array:
+    """Rotations (N, 3, 3) with one constant rotation before them and one behind them, those that bring them nearest to others (N, 3, 3):
+    each is found in turn."""
+    above, below = np.eye(3), np.eye(3)
+    for _ in range(ALIGNMENTS):
+        below = _nearest_rotation((ours.swapaxes(1, 2) @ above.T @ theirs).sum(0))
+        above = _nearest_rotation((theirs @ (ours @ below).swapaxes(1, 2)).sum(0))
+    return above @ ours @ below
+
+
+def _nearest_rotation(matrix: Array) -> Array:
+    """The rotation (3, 3) nearest to a sum of rotations."""
+    u, _, vt = np.linalg.svd(matrix)
+    return u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
 
 
 def wrapped(angles: Array) -> Array:

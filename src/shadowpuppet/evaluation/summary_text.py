@@ -116,5 +116,17 @@ def feet_text(feet: Mapping[str, Any]) -> str | None:
     return f"in stance they slide by {_plain(shown['slide_mm_s'])} mm/s{beside}{below}{contacts}; floor at {feet['floor_m']:.3f} m"
 
 
+def gait_text(gait: Mapping[str, Any]) -> str | None:
+    """The gait in words; None for a run without contacts of feet."""
+    if not gait:
+        return None
+    if not gait["figures"]:
+        return gait["no_gait"]
+    cadence, length, width, stance, speed = (gait["figures"][name]["both"]["mean"] for name in (
+        "cadence", "step length", "step width", "stance", "speed"))
+    return (f"{gait['strides']} strides, {gait['steps']} steps: {cadence:.1f} steps/min, {length:.3f} m long, {width:.3f} m wide, "
+            f"{speed:.2f} m/s, stance {stance:.1f} %")
+
+
 def _plain(value: float) -> str:
     return f"{value:.0f}" if np.isfinite(value) else "unknown"

@@ -4,6 +4,7 @@
     angles.csv     time, every degree of freedom (rad or m), then <dof>_sd
     intervals.csv  time, joint, mode, weight, x, y, z, x_low, x_high, y_low, ... (m, world): 90 % bounds, and other places (`io.intervals`)
     contacts.csv   time, height of the floor (m), <point>_contact and <point>_probability of heels and toes (`io.contacts`)
+    angles.toml    what each degree of freedom means: zero, positive sense, order, limits (`io.angle_conventions`)
     motion.npz     the fields of `Motion`, arrays only
     raw.csv        joints.csv and angles.csv as they were tracked, if they were smoothed afterwards; then run.toml has [smoothing]
     run.toml       complete, frames, body, versions, and what the tracker adds: recording, method, seed, settings, sizes, ...; [floor] with
@@ -34,6 +35,7 @@ from shadowpuppet.motion.motion import Motion
 TABLES = ("joints.csv", "angles.csv", "intervals.csv")
 RAW = "raw.csv"
 CONTACTS = "contacts.csv"
+ANGLES = "angles.toml"
 METRICS_LIMIT = 50_000_000
 """Greatest size of metrics.json, bytes."""
 

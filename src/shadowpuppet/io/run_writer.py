@@ -13,6 +13,7 @@ from typing import Any, BinaryIO, Self
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, reason, shown
 from shadowpuppet.io import checkpoint
+from shadowpuppet.io.angle_conventions import write_angles
 from shadowpuppet.io.contacts import write_contacts
 from shadowpuppet.io.files.lock import LOCK, locked
 from shadowpuppet.io.files.plain import for_json, for_toml, plain
@@ -22,11 +23,11 @@ from shadowpuppet.io.intervals import IntervalWriter
 from shadowpuppet.io.motion.npz import write_motion_npz
 from shadowpuppet.io.motion.table import run_headers, run_rows, write_raw
 from shadowpuppet.io.people import PEOPLE, remove_people
-from shadowpuppet.io.run import CONTACTS, RAW, TABLES
+from shadowpuppet.io.run import ANGLES, CONTACTS, RAW, TABLES
 from shadowpuppet.motion.contact.contact import contacts_of
 from shadowpuppet.motion.motion import Mode, Motion, MotionBuilder, MotionFrame
 
-MADE = (RAW, CONTACTS, "motion.npz", "metrics.json", "overlay.mp4")
+MADE = (RAW, CONTACTS, ANGLES, "motion.npz", "metrics.json", "overlay.mp4")
 """Files written at the end of a run."""
 FILES = (checkpoint.STATE, *MADE, *TABLES, checkpoint.FRAMES, "look.json", "person.toml", "calibration.toml")
 """Files of an earlier run that a new one in its folder replaces or removes. run.toml, which marks a run's folder, always stays."""
@@ -216,6 +217,7 @@ class RunWriter:
         write_motion_npz(self.folder / "motion.npz", motion)
         if (contacts := contacts_of(motion.table)) is not None:
             write_contacts(self.folder / CONTACTS, motion.times, contacts)
+        write_angles(self.folder / ANGLES, motion.body_name, motion.dof_names)
         counts = {"complete": complete, "frames": len(motion), "status": motion.status_counts,
                   "limb_status": motion.limb_status_counts}
         write_metrics(self.folder, counts | self.metrics)

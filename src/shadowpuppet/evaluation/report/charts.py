@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.evaluation.error_metrics import true_stretches
+from shadowpuppet.evaluation.error_metrics import hinge_angles, true_stretches
 from shadowpuppet.evaluation.evaluation import Evaluation
-from shadowpuppet.geometry import Array
+from shadowpuppet.evaluation.movement.angles import PERCENT, Cycle
+from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.io.intervals import HALF_WIDTH
 from shadowpuppet.io.motion.table import dof_unit
 from shadowpuppet.motion.metrics import accelerations
@@ -199,6 +200,53 @@ def angles_over_time(of: Evaluation) -> str:
         return _svg(figure, "angles")
 
 
+def bland_altman(of: Evaluation) -> str:
+    """Differences of the angles of elbows and knees over their means, with the mean difference and 1.96 standard deviations on both sides
+    of it."""
+    assert of.table is not None
+    assert of.truth is not None
+    pairs = hinge_angles(of.table, of.truth)
+    hinges = list(dict.fromkeys(name.partition("_")[2] for name in pairs))
+    with _drawing("agreement", (10, 3.2), columns=len(hinges)) as (figure, grid):
+        for name, (ours, theirs) in pairs.items():
+            side, _, hinge = name.partition("_")
+            axes, colour, off = grid.flat[hinges.index(hinge)], SIDES[side], ours - theirs
+            chosen = evenly_spread(len(off), POINTS)
+            axes.plot((ours + theirs)[chosen] / 2, off[chosen], ".", ms=3, color=colour, alpha=0.5, label=side)
+            axes.axhline(off.mean(), color=colour, lw=1.4)
+            for limit in (-1.96, 1.96):
+                axes.axhline(off.mean() + limit * off.std(), color=colour, lw=1, ls="--")
+            axes.set_title(hinge, fontsize=9, loc="left", pad=3)
+            axes.set(xlabel="mean of run and truth, degrees", ylabel="run less truth, degrees")
+        drawn = {label: handle for axes in grid.flat for handle, label in zip(*axes.get_legend_handles_labels())}
+        figure.legend(drawn.values(), drawn.keys(), loc="outside upper center", ncols=len(drawn), markerscale=3)
+        return _svg(figure, "agreement")
+
+
+def gait_cycle(cycles: Sequence[Cycle], stance: Mapping[str, float]) -> str:
+    """Every angle over the gait cycle, both sides in one panel, with `stance`, % of the cycle by side, dotted."""
+    panels = list(dict.fromkeys(each.name for each in cycles))
+    rows = -(-len(panels) // COLUMNS)
+    with _drawing("cycle", (10, 0.6 + 1.6 * rows), rows, (1,) * rows, COLUMNS) as (figure, grid):
+        places = dict(zip(panels, grid.flat))
+        for axes in list(grid.flat)[len(panels) :]:
+            axes.set_axis_off()
+        for each in cycles:
+            axes, colour = places[each.name], SIDES[each.side]
+            axes.fill_between(PERCENT, each.mean - each.stated, each.mean + each.stated, color=colour, alpha=0.1, lw=0)
+            axes.fill_between(PERCENT, each.mean - each.sd, each.mean + each.sd, color=colour, alpha=0.35, lw=0)
+            axes.plot(PERCENT, each.mean, color=colour, lw=1.4, label=each.side)
+        for name, axes in places.items():
+            for side, percent in stance.items():
+                axes.axvline(percent, color=SIDES[side], lw=0.9, ls=":")
+            axes.set_title(name, fontsize=9, loc="left", pad=3)
+            axes.set(xlim=(0, 100), xticks=(0, 25, 50, 75, 100))
+            axes.tick_params(labelsize=8)
+        drawn = {label: handle for axes in places.values() for handle, label in zip(*axes.get_legend_handles_labels())}
+        figure.legend(drawn.values(), drawn.keys(), loc="outside upper center", ncols=len(drawn))
+        return _svg(figure, "cycle")
+
+
 def coverage_chart(coverage: Mapping[str, Any], levels: Sequence[str]) -> str:
     """Found against stated coverage of the intervals."""
     with _drawing("coverage", (3.6, 3.3)) as (figure, axes):
@@ -215,7 +263,7 @@ class _drawing:
     """Context of a matplotlib figure with panels, in our style."""
 
     def __init__(self, name: str, size: tuple[float, float], rows: int = 1, ratios: Sequence[float] = (1,),
-                 columns: int = 1) -> None:
+                 columns: int | None = None) -> None:
         from matplotlib import rc_context
 
         style: dict[Any, Any] = {**STYLE, "svg.hashsalt": name}
@@ -229,7 +277,7 @@ class _drawing:
         self._context.__enter__()
         figure = Figure(figsize=self._size, layout="constrained")
         FigureCanvasSVG(figure)
-        return figure, figure.subplots(self._rows, self._columns, height_ratios=self._ratios, squeeze=self._columns == 1)
+        return figure, figure.subplots(self._rows, self._columns or 1, height_ratios=self._ratios, squeeze=self._columns is None)
 
     def __exit__(self, *error: Any) -> None:
         self._context.__exit__(*error)

@@ -11,8 +11,10 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.error_metrics import aligned_distances
 from shadowpuppet.evaluation.evaluation import Evaluation, check_output
 from shadowpuppet.evaluation.interval_coverage import LEVELS
+from shadowpuppet.evaluation.movement.movement import movement_of
 from shadowpuppet.evaluation.report import charts
 from shadowpuppet.evaluation.report.html import document, figure, plain, rows, table
+from shadowpuppet.evaluation.report.movement_section import movement_section
 from shadowpuppet.evaluation.report.pictures import ReportFrame, pictures, report_frames
 from shadowpuppet.evaluation.report.sections import (
     alignments_table,
@@ -63,8 +65,13 @@ def _parts(of: Evaluation, name: str) -> Iterator[str]:
         yield from _joints(of)
         yield from _motion(of)
         yield body_tables(of)
+        if of.measured["bends_deg"]:
+            note = ("Bland and Altman's plot of the bends: is the difference from the truth the same at every angle? Lines: its mean, and "
+                    "1.96 standard deviations on both sides.")
+            yield figure(charts.bland_altman(of), note)
     if len(of.run.motion) and any(dof_unit(name) == "rad" for name in of.run.motion.dof_names):
         yield _angles(of)
+        yield movement_section(movement_of(of.run))
     yield _silhouettes(of)
     if of.errors is not None:
         yield _intervals(of)

@@ -110,16 +110,20 @@ def body_tables(of: Evaluation) -> str:
     if measured["bends_deg"]:
         parts.append("<h3>How far elbows and knees are bent, degrees</h3>" + _angles(measured["bends_deg"]))
     if "angles_deg" in measured:
-        turns = rows(((name.replace("_", " "), f"{value:.1f}") for name, value in measured["angles_deg"].items()), sums=1)
-        parts.append(f'<div class="pair"><div><h3>Turns of joints, degrees</h3>{table(["", "rmse"], turns)}</div><div><h3>Single angles, '
-                     f'degrees</h3>{_angles(measured["dofs_deg"])}</div></div>')
+        aligned = measured["angles_aligned_deg"]
+        turns = rows(((name.replace("_", " "), f"{value:.1f}", f"{aligned[name]:.1f}") for name, value in measured["angles_deg"].items()),
+                     sums=1)
+        joints = table(["", "rmse", "frames aligned"], turns)
+        parts.append(f'<div class="pair"><div><h3>Turns of joints, degrees</h3>{joints}</div><div><h3>Single angles, degrees</h3>'
+                     f'{_angles(measured["dofs_deg"])}</div></div>')
     return "<h2>Body</h2>" + "".join(parts) if parts else ""
 
 
 def _angles(angles: Mapping[str, Mapping[str, float]]) -> str:
     """Table of errors of angles."""
-    items = ((name.replace("_", " "), f"{off['bias']:+.1f}", f"{off['mean']:.1f}", f"{off['rmse']:.1f}") for name, off in angles.items())
-    return table(["", "run less truth", "mean size", "rmse"], rows(items))
+    items = ((name.replace("_", " "), f"{off['bias']:+.1f}", f"{off['mean']:.1f}", f"{off['rmse']:.1f}", f"{off['aligned']:.1f}")
+             for name, off in angles.items())
+    return table(["", "run less truth", "mean size", "rmse", "without the mean"], rows(items))
 
 
 def definitions_section(of: Evaluation) -> str:
