@@ -287,7 +287,7 @@ def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Seque
     prior = np.diag(np.tile(1 / np.square(deviations[deviations > 0]), len(free)))
 
     def inverse(noise: float) -> Array:
-        return basis @ np.linalg.inv(basis.T @ (H[np.ix_(places, places)] / noise + prior) @ basis) @ basis.T
+        return np.asarray(basis @ np.linalg.inv(basis.T @ (H[np.ix_(places, places)] / noise + prior) @ basis) @ basis.T, float)
 
     within = ((inverse(1.0) @ blocks[:, places].T) ** 2).sum(1) * BLOCKS / (BLOCKS - 1)
     own = np.zeros(size)
