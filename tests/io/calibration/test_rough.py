@@ -41,6 +41,11 @@ def test_cameras_stand_where_they_are_said_to_and_are_level(tmp_path):
     assert "calibrate RECORDING --from-person" in examine_calibration(path, sizes=lambda name: (480, 640)).notes[0]
 
 
+def test_a_unit_and_an_up_direction_are_those_of_other_calibrations(tmp_path):
+    left, _ = read_calibration(written(tmp_path, TEXT), unit="mm", up="y", sizes=lambda name: (480, 640))
+    np.testing.assert_allclose(left.centre, [2.5, -3, 1.4], atol=1e-9)
+
+
 def test_rough_places_are_no_calibration_of_a_recording(tmp_path):
     written(tmp_path, TEXT)
     assert find_calibration(tmp_path) is None

@@ -12,7 +12,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, ShadowPuppetError, reason
 from shadowpuppet.geometry import Array, inverse, rigid
 from shadowpuppet.io.calibration.draft import Draft
-from shadowpuppet.io.calibration.formats import format_of
+from shadowpuppet.io.calibration.formats import ROUGH, format_of
 from shadowpuppet.io.calibration.opencv import SUFFIXES, easymocap_texts
 from shadowpuppet.io.calibration.pose2sim import check_name, tables_text
 from shadowpuppet.io.files.text import write_whole
@@ -75,6 +75,8 @@ def examine_calibration(path: str | Path, unit: str | None = None, up: str | Non
         if value is not None and value not in known:
             raise CalibrationError(f"{path}: {what}: found {value!r}, expected one of {', '.join(known)}")
     kind = format_of(path)
+    if kind is ROUGH:  # metres and z up always: what a recording states is its calibration's
+        unit = up = None
     found = kind.read(path)
     used, notes = unit or found.unit or "m", list(found.notes)
     cameras: dict[str, Camera] = {}
