@@ -19,7 +19,7 @@ from shadowpuppet.calibration.boards.board import Board, board_from, board_text
 from shadowpuppet.calibration.boards.printing import rectangles
 from shadowpuppet.calibration.session import calibrate, open_session
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.geometry import inverse, rigid, rotation_about, rotation_from_vector
+from shadowpuppet.geometry import align, inverse, rigid, rotation_about, rotation_from_vector
 from shadowpuppet.video.writer import write_frames
 
 TEXELS = 1000
@@ -203,9 +203,12 @@ def make_session(folder: Path, board: Board, cameras: list[Camera], seconds: flo
 
 
 def errors(truth: list[Camera], found: list[Camera]) -> list[tuple[str, ...]]:
-    """Rows of errors: focal lengths (%), principal point (pixels), picture (pixels), place (mm), direction (degrees)."""
+    """Rows of errors: focal lengths (%), principal point (pixels), picture (pixels), place (mm), direction (degrees), place (mm) within the
+    rig, after one rigid motion of all cameras."""
     rows = []
-    for true, camera in zip(truth, found):
+    here, there = (np.array([camera.centre for camera in cameras]) for cameras in (found, truth))
+    within = 1000 * np.linalg.norm(align(here, there).apply(here) - there, axis=1)
+    for own, true, camera in zip(within, truth, found):
         focal = 100 * max(abs(camera.matrix[k, k] / true.matrix[k, k] - 1) for k in (0, 1))
         principal = float(np.linalg.norm((camera.matrix - true.matrix)[:2, 2]))
         w, h = true.size
@@ -216,7 +219,8 @@ def errors(truth: list[Camera], found: list[Camera]) -> list[tuple[str, ...]]:
         T = camera.T_camera_world @ inverse(true.T_camera_world)
         place = 1000 * float(np.linalg.norm(camera.centre - true.centre))
         angle = float(np.degrees(np.arccos(np.clip((np.trace(T[:3, :3]) - 1) / 2, -1, 1))))
-        rows.append((true.name, f"{focal:.2f}", f"{principal:.2f}", f"{np.sqrt((off**2).mean()):.2f}", f"{place:.1f}", f"{angle:.3f}"))
+        rows.append((true.name, f"{focal:.2f}", f"{principal:.2f}", f"{np.sqrt((off**2).mean()):.2f}", f"{place:.1f}", f"{angle:.3f}",
+                     f"{own:.1f}"))
     return rows
 
 
@@ -243,7 +247,7 @@ def main() -> None:
     begun = time.perf_counter()
     found = calibrate(open_session(args.folder))
     took = time.perf_counter() - begun
-    print("camera  focal, %  principal, px  picture, px  place, mm  direction, deg")
+    print("camera  focal, %  principal, px  picture, px  place, mm  direction, deg  within the rig, mm")
     for row in errors(cameras, list(found.cameras)):
         print("  ".join(row))
     for fit in found.lenses:
