@@ -1,6 +1,6 @@
 """Stances of both feet: when each is on the floor, and where.
 
-Contact tells which stances there are. When they begin and end is told more evenly, in a walk, by where the ankle is farthest ahead of the
+Contact with the floor gives the stances. Their beginnings and ends are more regular, in a walk, where the ankle is farthest ahead of the
 pelvis and farthest behind it (Zeni, Richards and Higginson 2008): feet of motion capture and of tracked people still slide as they land.
 """
 

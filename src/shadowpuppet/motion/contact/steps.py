@@ -79,7 +79,7 @@ class Stride(NamedTuple):
 
 
 class Gait(NamedTuple):
-    """All steps of a motion, and the strides of which all counts."""
+    """All steps of a motion, and the strides whose steps all count."""
 
     strikes: dict[str, int]
     """Number of strikes by side."""

@@ -15,7 +15,7 @@ from shadowpuppet.calibration.solve.tangency_bundle import ROUGH_FOCAL, Tangency
 from shadowpuppet.calibration.time_offset import time_offsets
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
-from shadowpuppet.geometry import Array, evenly_spread, inverse, rigid, rotation_from_vector, unit
+from shadowpuppet.geometry import Array, inverse, rigid, rotation_from_vector, unit
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.repair.check import SilhouetteSets, aligned_sets, gather_silhouettes
@@ -120,10 +120,11 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, 
     if any(late):
         there = in_step(there, [sets.every * steps / there.rate for steps in late])
         sets = gather_silhouettes(there, options, listener, whole=True)
-        fit = placed_by_rows(there.cameras, chosen_sets(sets), rough_focal)
+    rows = aligned_sets(sets.rows, [0.0] * len(there.cameras), SETS)
+    fit = placed_by_rows(there.cameras, rows, rough_focal) if any(late) else fit
     listener.begin("floor and height")
     unknown = rough_focal > 0 and not fit.focal_sd.any()
-    placed = grounded(fit, chosen_sets(sets), options.height or rig.recording.subject.height)
+    placed = grounded(fit, rows, options.height or rig.recording.subject.height)
     early = min(view.start for view in there.recording.views) - min(view.start for view in rig.recording.views)  # of the clock itself
     starts = {view.camera.name: round(view.start - early, 4) for view in there.recording.views}
     changed = any(abs(starts[view.camera.name] - view.start) > SAME_START for view in rig.recording.views)
@@ -170,11 +171,6 @@ def placed_by_rows(cameras: Sequence[Camera], rows: Sequence[Row], rough_focal: 
 def _shifts(cameras: Sequence[Camera], sets: SilhouetteSets) -> Array:
     """Sets (C,) by which films are late as seen from cameras; 0 where that is not known, and without cameras."""
     return np.array([late or 0.0 for late in time_offsets(cameras, sets.rows).frames] if cameras else np.zeros(len(sets.rows[0])))
-
-
-def chosen_sets(sets: SilhouetteSets) -> list[Row]:
-    """The silhouettes whose outlines are compared: `SETS` sets, spread over all."""
-    return [sets.rows[n] for n in evenly_spread(len(sets.rows), SETS)]
 
 
 def grounded(fit: TangencyFit, rows: Sequence[Row], height: float | None) -> Placed:
