@@ -185,7 +185,7 @@ def _minimised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequen
     found = [_distances(_moved(cameras, value), hulls, pair) for pair in pairs]
     cost = _loss(found, scale) + float((prior * value.ravel()[places] ** 2).sum()) / 2
     for _ in range(STEPS):
-        H, g = _normal(_linearised(cameras, hulls, pairs, value, found, free), value.size, scale)
+        H, g = _normal(_linearised(cameras, hulls, pairs, value, found, free, deviations), value.size, scale)
         H, g = H[np.ix_(places, places)] + np.diag(prior), g[places] + prior * value.ravel()[places]
         gain = 0.0
         for _ in range(8):
@@ -231,11 +231,12 @@ class _Linear(NamedTuple):
 
 
 def _linearised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], value: Array, found: Sequence[Array],
-                free: Sequence[int]) -> Iterator[_Linear]:
+                free: Sequence[int], deviations: Array) -> Iterator[_Linear]:
     """The distances `found` at increments (C, PARAMETERS) of pairs with a `free` camera and, by differences, their derivatives; 0 by the
-    increments of the others."""
+    increments of the others, and by those without a deviation in the prior, which stay."""
     now = _moved(cameras, value)
-    nudged = {n: [_moved_one(cameras[n], value[n] + step) for step in np.eye(PARAMETERS) * NUDGE] for n in free}
+    steps = {k: NUDGE * np.eye(PARAMETERS)[k] for k in np.flatnonzero(deviations).tolist()}
+    nudged = {n: {k: _moved_one(cameras[n], value[n] + step) for k, step in steps.items()} for n in free}
     for pair, base in zip(pairs, found):
         moving = [(side, n) for side, n in enumerate(pair[:2]) if n in nudged]
         if not moving:
@@ -243,8 +244,8 @@ def _linearised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Seque
         known = np.isfinite(base)
         slopes = np.zeros((2 * PARAMETERS, known.sum()))
         for side, n in moving:
-            for k in range(PARAMETERS):
-                there = [*now[:n], nudged[n][k], *now[n + 1 :]]
+            for k, camera in nudged[n].items():
+                there = [*now[:n], camera, *now[n + 1 :]]
                 slopes[PARAMETERS * side + k] = np.nan_to_num((_distances(there, hulls, pair)[known] - base[known]) / NUDGE)
         columns = np.concatenate([PARAMETERS * n + np.arange(PARAMETERS) for n in pair[:2]])
         yield _Linear(columns, slopes, base[known], np.repeat(pair.sets[:, None], 2, 1)[known])
@@ -272,7 +273,7 @@ def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Seque
     `OUTLINE_ERROR` of every outline that differs from the others: a person who stands still shows few. If all cameras are free, within the
     rig: not of what a motion or a scale of the whole rig changes."""
     size = PARAMETERS * len(cameras)
-    parts = list(_linearised(cameras, hulls, pairs, np.zeros((len(cameras), PARAMETERS)), found, free))
+    parts = list(_linearised(cameras, hulls, pairs, np.zeros((len(cameras), PARAMETERS)), found, free, deviations))
     H, _ = _normal(parts, size, scale)
     sets = max(int(pair.sets[-1]) for pair in pairs) + 1
     blocks = np.zeros((BLOCKS, size))
