@@ -10,6 +10,7 @@ import sys
 import tomllib
 from pathlib import Path
 from pkgutil import resolve_name
+from runpy import run_path
 
 import pytest
 
@@ -63,10 +64,35 @@ def test_an_unknown_name_is_an_attribute_error():
 # Versions and files
 
 
-def test_versions_agree():
-    cited = re.search(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text("utf-8"), re.MULTILINE)
-    assert cited is not None
-    assert cited[1] == PROJECT["version"] == shadowpuppet.__version__
+def test_the_version_is_that_of_the_last_tag():
+    assert PROJECT["dynamic"] == ["version"]
+    assert "version" not in PROJECT
+    assert re.match(r"\d+\.\d+(\.\d+)?(\.dev\d+)?($|\+)", shadowpuppet.__version__)
+    assert not re.search(r"^version:", (ROOT / "CITATION.cff").read_text("utf-8"), re.MULTILINE)
+
+
+@pytest.mark.parametrize(("tag", "title", "waiting", "wrong"), [
+    ("v1.2.3", "[1.2.3] - 2026-11-23", "", None),
+    ("1.2.3", "[1.2.3] - 2026-11-23", "", "tag: found '1.2.3'"),
+    ("v1.2.3rc1", "[1.2.3rc1] - 2026-11-23", "", "tag: found"),
+    ("v1.2.3", "[1.2.4] - 2026-11-23", "", "found no line"),
+    ("v1.2.3", "[1.2.3]", "", "found no line"),
+    ("v1.2.3", "[1.2.3] - 2026-11-23", "- Something.", "changes under Unreleased"),
+])  # fmt: skip
+def test_a_tag_is_released_with_its_changes_only(tag, title, waiting, wrong):
+    log = f"# Changelog\n\n## [Unreleased]\n\n{waiting}\n\n## {title}\n\n- Something else.\n"
+    found = run_path(str(ROOT / ".ci" / "check_release.py"))["problems"](tag, log)
+    assert (not found) if wrong is None else any(wrong in line for line in found)
+
+
+def test_the_conda_recipe_needs_what_the_package_needs():
+    names = {"py-opencv": "opencv-python-headless"}
+    recipe = (ROOT / "packaging" / "conda" / "recipe.yaml").read_text("utf-8")
+    run = re.search(r"^  run:\n((?:    - .*\n)+)", recipe, re.MULTILINE)
+    assert run is not None
+    needed = [line.removeprefix("    - ") for line in run[1].splitlines()]
+    assert needed[0] == f"python {PROJECT['requires-python']}"
+    assert [re.sub(r"^[\w-]+", lambda name: names.get(name[0], name[0]), line).replace(" ", "") for line in needed[1:]] == PROJECT["dependencies"]
 
 
 def test_the_licence_is_the_one_that_is_reported():

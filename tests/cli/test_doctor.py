@@ -43,6 +43,22 @@ def test_where_the_tests_run_the_core_works(told):
             assert f"\n{name}  " in "\n" + out
 
 
+def test_warming_up_tracks_one_camera_and_four_and_leaves_nothing(monkeypatch, tmp_path, capsys):
+    from shadowpuppet.pipeline import track
+
+    tracked = []
+
+    def noted(recording, run, options):
+        tracked.append((len(list((recording / "video").iterdir())), options.anyway))
+
+    monkeypatch.setattr(track, "track_recording", noted)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert cli.run(["doctor", "--warm"]) == 0
+    assert tracked == [(1, True), (4, True)]
+    assert list(tmp_path.iterdir()) == []
+    assert "compiling everything, once" in capsys.readouterr().err
+
+
 def test_json_has_everything(told):
     code, out = told("--json")
     read = json.loads(out)

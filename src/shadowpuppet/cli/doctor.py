@@ -54,15 +54,25 @@ class Finding:
     """Whether tracking is impossible without it."""
 
 
-def doctor(*, as_json: Annotated[bool, Parameter(name="--json", group="Other", negative=(), show_default=False, help="Print JSON.")] = False
-           ) -> int:  # fmt: skip
+def doctor(
+    *,
+    warm: Annotated[bool, Parameter(group="Other", negative=(), show_default=False, help="Compile everything first.")] = False,
+    as_json: Annotated[bool, Parameter(name="--json", group="Other", negative=(), show_default=False, help="Print JSON.")] = False,
+) -> int:
     """Check what works on this machine, and how to mend what does not: libraries, compiled kernels, films, extras, browser, cameras.
+
+    With `--warm` all that tracking compiles is compiled now, in a minute or two, and kept: the first recording then starts at once.
 
     Exit code 1: something that tracking needs does not work.
     """
     import json
 
     console = Console(stderr=True, quiet=as_json)
+    if warm:
+        from shadowpuppet.cli.warm_up import warm_up
+
+        console.print("compiling everything, once: a minute or two", highlight=False)
+        warm_up()
     with console.status("trying what works") if console.is_terminal else nullcontext():
         found = examine()
     if as_json:
