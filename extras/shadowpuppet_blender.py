@@ -33,7 +33,7 @@ DOUBTFUL = {"uncertain": (0.791, 0.347, 0.0, 1.0), "predicted": (0.665, 0.112, 0
 """Colours of limbs that are not vouched for."""
 FILMS = (".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v", ".mpg")
 ARM, LEG = ("shoulder", "elbow", "wrist", "hand"), ("hip", "knee", "ankle", "heel", "toe")
-THICKNESS = 0.03
+THICKNESS = 0.06
 """Metres."""
 
 

@@ -43,6 +43,7 @@ class Page {
   }
   anchor() { this.began = performance.now(); this.from = this.times[this.frame]; }
   play(on) {
+    if (this.times.length < 2) return;
     if (on && this.frame == this.times.length - 1) this.show(0);
     this.playing = on;
     id("play").textContent = on ? "Pause" : "Play";
