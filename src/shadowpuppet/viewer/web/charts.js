@@ -37,7 +37,7 @@ class Strip {
         canvas => this.drawStatus(canvas, status, strip.limbs.length, k)));
       for (const row of strip.rows) {
         const values = unpack(row.values);
-        const top = row.unit == "of 1" ? 1 : Math.max(...values.filter(Number.isFinite));
+        const top = row.unit == "of 1" ? 1 : extent([...values])[1];
         this.add(rows, `${row.short}, 0–${shown(top, row.unit)}`, `${row.name} over the run, 0 to ${shown(top, row.unit)}`, 22, seek,
           canvas => this.drawValues(canvas, values, top));
       }
