@@ -625,9 +625,11 @@ def test_the_page_is_for_its_own_machine_and_itself(rig):
         for headers, code in (({"Host": "evil.example"}, 421), ({"Origin": "http://evil.example"}, 403)):
             with pytest.raises(urllib.error.HTTPError) as refused:
                 urllib.request.urlopen(urllib.request.Request(address, headers=headers))
+            refused.value.close()
             assert refused.value.code == code
-        with pytest.raises(urllib.error.HTTPError, match="404"):
+        with pytest.raises(urllib.error.HTTPError, match="404") as refused:
             urllib.request.urlopen(f"{address}etc/passwd")
+        refused.value.close()
         with pytest.raises(SettingsError, match="free port"), serving(scene, port=int(address.rstrip("/").rpartition(":")[2])):
             pass
 
@@ -650,8 +652,9 @@ def test_live_pages_of_other_sites_and_names_are_refused():
             policy = answer.headers["Content-Security-Policy"]
             assert (answer.status, "frame-ancestors 'none'" in policy, "http" in policy) == (200, True, False)
         strange = urllib.request.Request(address, headers={"Host": "evil.example"})
-        with pytest.raises(urllib.error.HTTPError, match="403"):
+        with pytest.raises(urllib.error.HTTPError, match="403") as refused:
             urllib.request.urlopen(strange)
+        refused.value.close()
         protocol = _protocol()
         socket = f"ws://127.0.0.1:{port}"
         with connect(socket, subprotocols=[protocol], origin=f"http://127.0.0.1:{port}") as ours:
