@@ -12,6 +12,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
@@ -19,33 +20,29 @@ from playwright.sync_api import Browser, sync_playwright
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.viewer.scene.open_any import open_scene
 from shadowpuppet.viewer.scene.scene import Scene
-from shadowpuppet.viewer.web.frustum_images import PictureMode
-from shadowpuppet.viewer.web.panel import Panel
-from shadowpuppet.viewer.web.scene_view import ViewOptions
-from shadowpuppet.viewer.web.serve import default_view, serving
+from shadowpuppet.viewer.web.serve import serving
 
 ASSETS = Path(__file__).parent / "assets"
 SIZE, COLOURS, LARGEST = (1280, 760), (255, 160, 96, 64), 150_000
 """Pixels; numbers of colours to try until the file is small enough; maximum size in bytes."""
 FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-dev-shm-usage")
+PHONE = (390, 844)
+ELBOW = "page.choose({figure: page.stage.figures[0], joint: page.stage.figures[0].jointNames.indexOf('right elbow')})"
+"""Chooses a joint, as a click on it does."""
+PARTICLES = "page.frameAll(false); [...document.querySelectorAll('#show label')].find(each => each.innerText.trim() == 'particles').click()"
 SETTLED = 6000
 """Milliseconds until everything is drawn."""
 
 
-def photographed(browser: Browser, scene: Scene, options: ViewOptions, name: str, second: float,
-                 then: Callable[[Panel], None] = lambda panel: None, size: tuple[int, int] = SIZE) -> None:
-    """A picture of the page at a second of the scene."""
-    with serving(scene, options, width=480) as (address, panel):
-        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+def photographed(browser: Browser, scene: Scene, name: str, second: float, then: str = "", size: tuple[int, int] = SIZE,
+                 scheme: Literal["light", "dark"] = "light") -> None:
+    """A picture of the page at a second of the scene, after some script."""
+    with serving(scene, port=0) as address:
+        page = browser.new_page(viewport={"width": size[0], "height": size[1]}, color_scheme=scheme)
         page.goto(address)
-        page.wait_for_selector("canvas")
         page.wait_for_timeout(SETTLED)
-        notice = page.locator(".mantine-Notification-closeButton")  # that there is no graphics card
-        if notice.count():
-            notice.first.click()
-        panel.timeline.seek(int(abs(scene.times - second).argmin()))
-        panel.again()
-        then(panel)
+        page.evaluate(f"page.seek({int(abs(scene.times - second).argmin())})")
+        page.evaluate(then or "0")
         page.wait_for_timeout(SETTLED)
         shot = Image.open(io.BytesIO(page.screenshot(timeout=120_000))).convert("RGB")
         page.close()
@@ -55,11 +52,6 @@ def photographed(browser: Browser, scene: Scene, options: ViewOptions, name: str
         if path.stat().st_size < LARGEST:
             break
     print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
-
-
-def through(name: str) -> Callable[[Panel], None]:
-    """Set the view to that of a camera."""
-    return lambda panel: setattr(panel.through, "value", name)
 
 
 def main() -> None:
@@ -76,14 +68,12 @@ def main() -> None:
         opened = tool.chromium.launch(executable_path=browser, args=[*FLAGS])
         several, one = open_scene(demo / "run-ring"), open_scene(demo / "run")
         ring = Path(several.facts["recording"])
-        hull = ViewOptions(hull=True, pictures=PictureMode.PICTURE)
-        particles = ViewOptions(transparent=True, particles=True, pictures=PictureMode.SILHOUETTE)
         pictures: dict[str, Callable[[str], None]] = {
-            "viewer": lambda name: photographed(opened, several, default_view(several), name, 2.0),
-            "viewer_hull": lambda name: photographed(opened, open_scene(ring, Options()), hull, name, 2.0),
-            "viewer_through": lambda name: photographed(opened, several, default_view(several), name, 2.0,
-                                                        through(several.cameras[0].camera.name)),
-            "viewer_particles": lambda name: photographed(opened, one, particles, name, 4.0),
+            "viewer": lambda name: photographed(opened, several, name, 2.0, ELBOW),
+            "viewer_phone": lambda name: photographed(opened, several, name, 2.0, size=PHONE, scheme="dark"),
+            "viewer_hull": lambda name: photographed(opened, open_scene(ring, Options()), name, 2.0, "page.frameAll(false)"),
+            "viewer_through": lambda name: photographed(opened, several, name, 2.0, "page.look(0)"),
+            "viewer_particles": lambda name: photographed(opened, one, name, 4.0, PARTICLES),
         }
         for name in wanted or pictures:
             pictures[name](name)

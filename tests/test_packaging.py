@@ -92,7 +92,8 @@ def test_the_conda_recipe_needs_what_the_package_needs():
     assert run is not None
     needed = [line.removeprefix("    - ") for line in run[1].splitlines()]
     assert needed[0] == f"python {PROJECT['requires-python']}"
-    assert [re.sub(r"^[\w-]+", lambda name: names.get(name[0], name[0]), line).replace(" ", "") for line in needed[1:]] == PROJECT["dependencies"]
+    wanted = [re.sub(r"^[\w-]+", lambda name: names.get(name[0], name[0]), line).replace(" ", "") for line in needed[1:]]
+    assert wanted == PROJECT["dependencies"]
 
 
 def test_the_licence_is_the_one_that_is_reported():

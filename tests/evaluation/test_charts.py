@@ -218,6 +218,7 @@ def test_one_frame_has_a_span_too():
 
 def test_plots_have_no_ground_of_their_own_and_scale_with_the_page(of):
     text = charts.coverage_chart({"within_50": 0.4}, ["50"])
-    assert re.match(r'<svg viewBox="0 0 [\d.]+ [\d.]+" role="img"', text)
+    wide, least = re.match(r'<svg viewBox="0 0 ([\d.]+) [\d.]+" style="min-width:(\d+)px" role="img"', text).groups()
+    assert float(least) >= float(wide)  # so that letters are never smaller than they were drawn
     assert "#ffffff" not in text  # the page has a dark form, too
     assert "<metadata>" not in text

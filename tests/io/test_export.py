@@ -253,12 +253,12 @@ def test_joints_become_any_other_file(shell, whole, tmp_path, target):
     assert code == 0, err
     assert f"made{target}" in out
     motion = read_run(whole).motion
-    if target in (".bvh", ".glb", ".mot", ".osim"):
+    if target in (".bvh", ".glb", ".usda", ".mot", ".osim"):
         assert "a body's poses fitted to 21 joints, 25 frames" in out
     if target == ".bvh":
         found = read_bvh(tmp_path / "made.bvh").joints().select(motion.joint_names).positions @ Y_UP
         assert np.sqrt(((found - motion.joints) ** 2).sum(2).mean()) < 0.02
-    elif target not in (".glb", ".mot", ".osim"):
+    elif target not in (".glb", ".usda", ".mot", ".osim"):
         found = read_motion(tmp_path / f"made{target}").select(motion.joint_names)
         np.testing.assert_allclose(found.positions, motion.joints, atol=2e-6)
 
@@ -344,5 +344,5 @@ def test_what_cannot_be_converted_is_said(shell, whole, tmp_path, monkeypatch):
 
 
 def test_help_names_the_formats(shell):
-    assert "bvh, c3d, csv, glb, mot, npz, osim, parquet, trc" in " ".join(shell("export", "--help")[1].replace("│", " ").split())
+    assert "bvh, c3d, csv, glb, mot, npz, osim, parquet, trc, usda" in " ".join(shell("export", "--help")[1].replace("│", " ").split())
     assert "--source-unit" in shell("convert", "--help")[1]

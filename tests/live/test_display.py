@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shadowpuppet import network
+from shadowpuppet import network, page_server
 from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
 from shadowpuppet.live.display import web
 from shadowpuppet.live.display.choice import open_display
@@ -206,7 +206,7 @@ def test_the_page_listens_to_this_machine_alone_by_default(page):
 
 
 def test_no_more_than_so_many_are_served_and_who_leaves_makes_room(monkeypatch):
-    monkeypatch.setattr(web, "MAX_CONNECTIONS", 2)
+    monkeypatch.setattr(page_server, "MAX_CONNECTIONS", 2)
     with WebDisplay(port=0) as page:
         address = ("127.0.0.1", page.server.server_port)
         with socket.create_connection(address), socket.create_connection(address), socket.create_connection(address) as third:
@@ -223,7 +223,7 @@ def test_no_more_than_so_many_are_served_and_who_leaves_makes_room(monkeypatch):
 
 @pytest.mark.parametrize("begun", [b"", b"GET / HT", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"])
 def test_half_a_request_is_ended_however_slowly_it_goes_on(monkeypatch, begun):
-    monkeypatch.setattr(web, "REQUEST_SECONDS", 0.3)
+    monkeypatch.setattr(page_server, "REQUEST_SECONDS", 0.3)
     with WebDisplay(port=0) as page, socket.create_connection(("127.0.0.1", page.server.server_port)) as slow:
         slow.settimeout(0.05)
         slow.sendall(begun)
@@ -240,7 +240,7 @@ def test_half_a_request_is_ended_however_slowly_it_goes_on(monkeypatch, begun):
 
 
 def test_a_stream_goes_on_after_the_time_for_requests(monkeypatch):
-    monkeypatch.setattr(web, "REQUEST_SECONDS", 0.2)
+    monkeypatch.setattr(page_server, "REQUEST_SECONDS", 0.2)
     with WebDisplay(port=0) as page:
         page.show(tracked())
         answer, _ = ask(page, "/events", read=False)

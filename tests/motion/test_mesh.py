@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import runs
 
+from shadowpuppet.camera.drawing import SIDE_COLOURS
 from shadowpuppet.geometry import rigid
 from shadowpuppet.motion.body_animation import TO_REST, BodyTree
 from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
@@ -87,8 +88,8 @@ def test_left_and_right_differ_in_colour():
     mesh = body_mesh(runs.body_of("anatomical"))
     left, right = (mesh.colours[mesh.points[:, 0] * side > 0.22] for side in (1, -1))
     assert len(left)
-    assert left[0, 0] > left[0, 2]
-    assert right[0, 0] < right[0, 2]
+    for side, colour in ((left, SIDE_COLOURS["left"]), (right, SIDE_COLOURS["right"])):  # linear; the overlay's, blue green red
+        assert 255 * side[0] ** (1 / 2.2) == pytest.approx(colour[::-1], abs=6)
 
 
 def test_a_skeleton_alone_has_a_stick_along_every_bone(rng):

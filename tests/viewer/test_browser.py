@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
-from dataclasses import replace
+from contextlib import closing, contextmanager
 from functools import partial
+from pathlib import Path
 
 import cv2
 import made
@@ -54,9 +55,10 @@ def browser():
 class Page:
     """A page, with all that it asked for and complained of."""
 
-    def __init__(self, browser, address):
+    def __init__(self, browser, address, width=1280, scheme="light"):
         self.requests, self.sockets, self.errors = [], [], []
-        self.page = browser.new_page(viewport={"width": 640, "height": 420})
+        self.context = browser.new_context(viewport={"width": width, "height": 760}, color_scheme=scheme, bypass_csp=True)
+        self.page = self.context.new_page()
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.on("websocket", lambda socket: self.sockets.append(socket.url))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
@@ -76,6 +78,10 @@ class Page:
             assert time.monotonic() < end, what
             self.page.wait_for_timeout(100)
 
+    def frame(self):
+        """The frame that is shown."""
+        return self.page.evaluate("page.frame")
+
     def outside(self, *allowed):
         """Requests beyond those to some addresses."""
         kinds = ("data:", "blob:", *allowed)
@@ -83,12 +89,12 @@ class Page:
 
 
 @contextmanager
-def page_of(browser, address):
-    page = Page(browser, address)
+def page_of(browser, address, **more):
+    page = Page(browser, address, **more)
     try:
         yield page
     finally:
-        page.page.close()
+        page.context.close()
 
 
 def coloured(image):
@@ -102,77 +108,138 @@ def moved(a, b):
     return int((np.abs(a - b).max(2) > 18).sum())
 
 
-def greenish(image):
-    red, green, blue = np.moveaxis(image, 2, 0)
-    return int(((green > red + 20) & (green > blue + 20)).sum())
+def of_colour(image, colour):
+    """Pixels of the hue of a colour, lit or shaded."""
+    unit = np.array(colour) / np.linalg.norm(colour)
+    lit = np.linalg.norm(image, axis=2)
+    return int(((image @ unit > 0.985 * lit) & (lit > 90)).sum())
 
 
-def test_the_page_shows_the_puppet_the_timeline_moves_it_and_clicks_reach_the_program(browser, run):
-    from shadowpuppet.viewer.web.scene_view import ViewOptions
+@pytest.fixture(scope="module")
+def axe():
+    """The text of axe-core, which finds what keeps people from using a page, from npm (`.ci/run`); empty where it is not there."""
+    folders = [Path(folder) for folder in os.environ.get("NODE_PATH", "").split(os.pathsep) if folder]
+    found = next((path for folder in folders if (path := folder / "axe-core" / "axe.min.js").exists()), None)
+    return "" if found is None else found.read_text()
+
+
+@pytest.fixture(scope="module")
+def file(run, tmp_path_factory):
+    """A file of a run with doubtful limbs and intervals."""
+    from shadowpuppet.viewer.web.page import write_page
+
+    return write_page(tmp_path_factory.mktemp("file") / "run.html", cut_scene(open_scene(run), 0.0, 2.5))
+
+
+def test_the_page_opens_playing_with_body_truth_film_and_all_cameras(browser, run):
     from shadowpuppet.viewer.web.serve import serving
 
-    scene = replace(open_scene(run), charts=())  # which are canvases, too
-    with serving(scene, ViewOptions(transparent=True, cameras=False)) as (address, panel), page_of(browser, address) as page:
-        page.wait(lambda: coloured(page.seen()) > 300, "the puppet is seen")
-        page.page.wait_for_timeout(1500)  # what fades in has done so
-        first = page.seen()
-        assert greenish(first) > 30  # the truth
-        click = page.page.get_by_role("button", name=">", exact=True).click
-        for _ in range(9):
-            click()
-        page.wait(lambda: panel.timeline.frame == 9, "nine steps")
-        page.wait(lambda: moved(page.seen(), first) > 12, "the timeline moves the puppet")
-        assert "frame 9" in page.page.inner_text("body")
-        page.page.get_by_role("button", name="|<", exact=True).click()
-        page.wait(lambda: moved(page.seen(), first) < 6, "back where it was")
-        for key, frame in (("l", 1), ("l", 2), ("j", 1)):
-            page.page.keyboard.press(key)
-            page.wait(lambda frame=frame: panel.timeline.frame == frame, f"the key {key}")
-        page.page.get_by_label("truth", exact=True).click()
-        page.wait(lambda: not panel.view.options.figures["truth"], "a click reaches the program")
-        page.wait(lambda: greenish(page.seen()) < 10, "the truth is gone")
-        page.page.get_by_role("button", name="Play", exact=True).click()
-        page.wait(lambda: panel.timeline.frame > 3, "it plays")
+    scene = open_scene(run)
+    with serving(scene, port=0) as address, page_of(browser, address) as page:
+        page.wait(lambda: page.frame() > 2, "it plays")
         page.page.get_by_role("button", name="Pause", exact=True).click()
-        page.wait(lambda: not panel.timeline.playing, "it stays")
-        address = address.rstrip("/")
-        assert page.outside(address, address.replace("http", "ws")) == []
-        assert page.sockets
-        assert page.errors == []
-
-
-def test_the_file_plays_alone(browser, run, tmp_path):
-    from shadowpuppet.viewer.web.page import write_page
-    from shadowpuppet.viewer.web.serve import default_view
-
-    scene = cut_scene(open_scene(run), 0.0, 2.5)
-    path = write_page(tmp_path / "run.html", scene, default_view(scene, pictures=False))
-    assert path.stat().st_size < 3e6
-    with page_of(browser, path.as_uri()) as page:
-        page.wait(lambda: coloured(page.seen()) > 300, "the puppet is seen")
+        page.wait(lambda: page.page.evaluate("document.getElementById('film').naturalWidth") > 0, "the film is in the corner")
+        image = page.seen()
+        for colour in ((0, 158, 115), (204, 121, 167)):
+            assert of_colour(image, colour) > 100, "left and right in the overlay's colours"
+        for place in ("page.stage.cameras[0].centre", "[9, -8, 3]"):  # wherever the camera stands
+            assert page.page.evaluate("""place => { const stage = page.stage, camera = stage.cameras[0], own = camera.centre;
+                camera.centre = place; page.frameAll();
+                const at = stage.onScreen(place), box = stage.canvas;
+                camera.centre = own; page.frameAll();
+                return at && at[0] > 0 && at[1] > 0 && at[0] < box.clientWidth && at[1] < box.clientHeight }""", page.page.evaluate(place))
+        page.page.get_by_role("button", name="First frame").click()
         first = page.seen()
-        page.wait(lambda: moved(page.seen(), first) > 12, "it plays")
-        assert page.outside(path.as_uri()) == []
+        for _ in range(9):
+            page.page.get_by_role("button", name="One frame on").click()
+        assert page.frame() == 9
+        page.wait(lambda: moved(page.seen(), first) > 12, "the timeline moves the puppet")
+        for key, frame in (("l", 10), ("l", 11), ("j", 10)):
+            page.page.keyboard.press(key)
+            assert page.frame() == frame
+        with_truth = page.seen()
+        page.page.get_by_label("truth", exact=True).click()
+        page.wait(lambda: moved(page.seen(), with_truth) > 3, "the truth is gone")
+        page.page.get_by_role("button", name=scene.cameras[0].camera.name, exact=True).click()
+        page.wait(lambda: page.page.evaluate("page.stage.through") == 0, "a click looks through the camera")
+        page.wait(lambda: moved(page.seen(), with_truth) > 300, "the film is behind the body")
+        particles = page.page.get_by_label("particles", exact=True)
+        particles.click()
+        page.wait(lambda: page.page.evaluate("page.stage.extra.particles !== null"), "particles are made")
+        assert page.outside(address.rstrip("/")) == []
+        assert (page.sockets, page.errors) == ([], [])
+
+
+def test_the_strip_seeks_and_a_joint_on_the_body_chooses_its_curves(browser, file):
+    with page_of(browser, file.as_uri()) as page:
+        page.page.evaluate("page.seek(0)")
+        strip = page.page.get_by_label("Status of left arm over the run")
+        box = strip.bounding_box()
+        strip.click(position={"x": 0.5 * box["width"], "y": 4})
+        last = page.page.evaluate("page.times.length") - 1
+        assert abs(page.frame() - last / 2) <= 1
+        page.page.evaluate("page.data.moments = [7, 20]; document.getElementById('next').disabled = false; page.seek(3)")
+        for frame in (7, 20, 7):
+            page.page.get_by_role("button", name="Next doubtful moment").click()
+            assert page.frame() == frame
+        x, y = page.page.evaluate("""() => { const f = page.stage.figures[0], j = f.jointNames.indexOf("right elbow");
+            return page.stage.onScreen(page.stage.joint(f, f.frames[page.frame], j)) }""")
+        page.page.locator("#space").click(position={"x": x, "y": y})
+        first, second = page.page.locator(".plot select").all()
+        assert first.input_value() == "right elbow (picked)"
+        assert second.input_value() == "angles: right arm"
+        legend = page.page.locator(".plot .legend").first.inner_text()
+        place = page.page.evaluate("""() => { const f = page.stage.figures[0];
+            return page.stage.joint(f, f.frames[page.frame], f.jointNames.indexOf("right elbow")) }""")
+        assert f"{place[0]:.3f} m ±" in legend, "the value at the current time, with its interval"
+        plot = page.page.locator(".plot canvas").first
+        plot.hover(position={"x": 60, "y": 40})
+        assert page.page.locator(".plot .legend").first.inner_text() != legend, "the values at the cursor"
+        plot.click(position={"x": 60, "y": 40})
+        assert page.frame() < 7
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 820, 1280])
+def test_the_file_plays_alone_at_any_width_and_is_open_to_all(browser, file, axe, width, scheme):
+    with page_of(browser, file.as_uri(), width=width, scheme=scheme) as page:
+        page.wait(lambda: page.frame() > 2, "it plays")
+        page.page.evaluate("page.play(false)")
+        page.wait(lambda: coloured(page.seen()) > 300, "the puppet is seen")
+        assert page.page.evaluate("document.documentElement.scrollWidth") <= width, "nothing is beside the page"
+        ground = page.page.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert (max(map(int, re.findall(r"\d+", ground))) < 60) == (scheme == "dark")
+        assert page.page.locator("#show").is_visible() == (width > 820), "the panel is folded on narrow screens"
+        assert page.outside(file.as_uri()) == []
         assert (page.sockets, page.errors) == ([], [])
         assert page.page.title() == "run"
+        if not axe:
+            pytest.skip("all but axe-core's rules was looked at: npm install axe-core, and NODE_PATH")
+        page.page.evaluate(axe)
+        page.page.evaluate("document.getElementById('panel').open = true")
+        found = page.page.evaluate("axe.run()")["violations"]
+        assert [(each["id"], [node["html"][:90] for node in each["nodes"]]) for each in found] == []
 
 
-def test_a_file_has_pictures_only_where_they_are_asked_for(run, tmp_path):
-    """What is in the file: silhouettes are as good as transparent pictures of one colour."""
-    from shadowpuppet.viewer.web import page as pages
-    from shadowpuppet.viewer.web.serve import default_view
+def test_the_report_of_a_run_can_be_read_on_a_phone_too(browser, run, axe):
+    from shadowpuppet.evaluation.evaluation import measure_run
+    from shadowpuppet.evaluation.report.page import write_report
 
-    scene, seen = cut_scene(open_scene(run), 0.0, 0.5), []
-    eye = scene.cameras[0].images
-    original = eye.picture
-    for asked in (False, True):
-        seen.clear()
-        eye.picture = lambda time: seen.append(time) or original(time)
-        eye.mask(99.0)
-        eye._masked = (np.nan, None)
-        pages.write_page(tmp_path / f"{asked}.html", scene, default_view(scene, pictures=asked))
-    sizes = [(tmp_path / f"{asked}.html").stat().st_size for asked in (False, True)]
-    assert sizes[1] > sizes[0] + 10_000
+    pytest.importorskip("matplotlib")
+    write_report(run / "report.html", measure_run(run))
+    with closing(browser.new_context(bypass_csp=True)) as context:
+        page = context.new_page()
+        page.goto((run / "report.html").as_uri())
+        for width in (390, 1280):
+            page.set_viewport_size({"width": width, "height": 760})
+            assert page.evaluate("document.documentElement.scrollWidth") <= width, "the page is no wider than the screen"
+            heights = page.evaluate("[...document.querySelectorAll('svg text')].map(each => each.getBoundingClientRect().height)")
+            assert min(height for height in heights if height) >= 9, "letters of charts, pixels"
+        if not axe:
+            pytest.skip("all but axe-core's rules was looked at: npm install axe-core, and NODE_PATH")
+        page.evaluate(axe)
+        found = page.evaluate("axe.run()")["violations"]
+        assert [(each["id"], [node["html"][:90] for node in each["nodes"]]) for each in found] == []
 
 
 def test_the_command_serves_until_it_is_interrupted(browser, run):

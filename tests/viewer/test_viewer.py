@@ -1,7 +1,8 @@
-"""What is shown of runs, recordings, priors and files, as data; the timeline; who may look at the page."""
+"""What is shown of runs, recordings, priors and files, as data; what is in the page; who may look at it."""
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import gc
 import json
@@ -14,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from time import monotonic, sleep
 
+import cv2
 import made
 import made_rig
 import numpy as np
@@ -24,6 +26,7 @@ from runs import body_of, make_people, make_run, smooth_poses
 
 from shadowpuppet.body.shapes import Quads
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.drawing import SIDE_COLOURS
 from shadowpuppet.cli.app import run as command
 from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid, rotation_about
@@ -34,22 +37,23 @@ from shadowpuppet.io.prior import write_prior
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.limbs import LIMBS
-from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.motion import STATUSES, JointTable
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.viewer.scene.colours import mesh_colours
 from shadowpuppet.viewer.scene.figures import animation_figure, joint_figure, pose_figure
 from shadowpuppet.viewer.scene.film_images import hull_function
 from shadowpuppet.viewer.scene.of_prior import body_of as body_of_prior
 from shadowpuppet.viewer.scene.of_prior import prior_scene, sampled_motion, stationary_shares
 from shadowpuppet.viewer.scene.of_run import side_by_side
 from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
-from shadowpuppet.viewer.scene.scene import Chart, Figure, Scene, SceneCamera
-from shadowpuppet.viewer.web.curves import AROUND, data_around, limits
-from shadowpuppet.viewer.web.frustum_images import PictureMode, Undistorter, frustum_image
-from shadowpuppet.viewer.web.nodes import colour_of
-from shadowpuppet.viewer.web.page import kept_frames, sealed_page
-from shadowpuppet.viewer.web.timeline import Timeline
+from shadowpuppet.viewer.scene.scene import Figure, Scene, SceneCamera
+from shadowpuppet.viewer.scene.strip import doubtful_moments, nearest_frames, strips_of
+from shadowpuppet.viewer.web.content import page_text
+from shadowpuppet.viewer.web.frustum_images import Undistorter, camera_image
+from shadowpuppet.viewer.web.page import kept_frames, write_page
+from shadowpuppet.viewer.web.serve import ScenePage, serving
 
 
 @pytest.fixture(scope="module")
@@ -126,106 +130,43 @@ def test_the_frame_that_is_shown_is_the_nearest_and_only_where_near():
     assert still.at(99.0) == 0
 
 
-# Timeline
+# The whole run at a glance
 
 
-class Clock:
-    now = 5.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
-def test_a_timeline_plays_at_its_speed_loops_and_stops():
-    clock = Clock()
-    line = Timeline(np.arange(10) / 10, clock)
-    assert line.tick() == 0
-    line.play()
-    for passed, frame in ((0.0, 0), (0.05, 0), (0.1, 1), (0.55, 5), (0.9, 9), (0.99, 9)):
-        clock.now = 5.0 + passed
-        assert line.tick() == frame
-    clock.now = 6.2
-    assert (line.tick(), line.playing) == (0, True)  # a loop
-    line.speed = 2.0
-    clock.now += 0.2
-    assert line.tick() == 4
-    line.loop = False
-    clock.now += 10
-    assert (line.tick(), line.playing) == (9, False)
-    line.play()  # from the start
-    assert line.tick() == 0
-    line.seek(5)
-    clock.now += 0.1
-    assert line.tick() == 7
-    line.step(-1)
-    assert (line.tick(), line.playing) == (6, False)
-    line.step(-100)
-    assert line.tick() == 0
-    line.loop = True
-    line.step(-1)
-    assert line.tick() == 9
+def test_a_strip_has_every_frame_of_the_timeline_and_doubt_begins_moments(tmp_path):
+    doubtful = {2: {"left_arm": "uncertain"}, 3: {"left_arm": "predicted"}, 20: {"right_leg": "uncertain"}}
+    scene = open_scene(make_run(tmp_path / "run", frames=25, lost=(24,), spread=True, doubtful=doubtful))
+    (strip,) = strips_of(scene)
+    assert strip.limbs == tuple(limb.replace("_", " ") for limb in LIMBS)
+    names = {n: [STATUSES[code] for code in strip.status[n]] for n in (0, 2, 3, 20, 24)}
+    assert names[0] == ["tracked"] * 5
+    assert [names[n][LIMBS.index("left_arm")] for n in (2, 3)] == ["uncertain", "predicted"]
+    assert (names[20][LIMBS.index("right_leg")], set(names[24])) == ("uncertain", {"lost"})
+    motion = read_run(tmp_path / "run").motion
+    assert strip.width[7] == pytest.approx(2000 * 1.645 * motion.joint_sd[7].max())
+    assert np.isnan(strip.width[24])
+    assert strip.overlap[:24] == pytest.approx(0.9)
+    assert np.isnan(strip.error).all()
+    assert doubtful_moments(scene) == [2, 20]  # the lost frame is one moment with the doubtful one a sixth of a second before
+    assert doubtful_moments(cut_scene(scene, 0.2, 0.7)) == []
+    assert strips_of(replace(scene, figures=())) == []
 
 
-@given(st.lists(st.tuples(st.sampled_from(["play", "pause", "wait", "seek", "step", "speed", "loop"]), st.floats(-3, 3)), max_size=20))
-def test_whatever_is_asked_a_timeline_has_a_frame(acts):
-    clock = Clock()
-    line = Timeline(np.array([0.0, 0.1, 0.15, 2.0]), clock)
-    for act, value in acts:
-        if act == "wait":
-            clock.now += abs(value)
-        elif act == "speed":
-            line.speed = abs(value) + 0.1
-        elif act == "loop":
-            line.loop = value > 0
-        elif act in ("seek", "step"):
-            getattr(line, act)(int(value * 2))
-        else:
-            getattr(line, act)()
-        assert 0 <= line.tick() < 4
-        assert line.time == line.times[line.frame]
+@given(st.lists(st.floats(0, 9), min_size=1, max_size=12, unique=True), st.lists(st.floats(-3, 12), min_size=1, max_size=12))
+def test_nearest_frames_are_those_of_a_search_through_all(times, wanted):
+    times, wanted = np.sort(times), np.array(wanted)
+    off = np.abs(times[:, None] - wanted)
+    step = np.median(np.diff(times)) if len(times) > 1 else np.inf
+    found = nearest_frames(times, wanted)
+    for n, least in enumerate(off.min(0)):
+        assert found[n] == -1 if least > step else off[found[n], n] == least
 
 
-def test_what_is_asked_while_the_timeline_advances_is_not_lost():
-    asked: list[threading.Thread] = []
-
-    def clock() -> float:
-        """At the third look, within `tick`, another thread pauses, as a page's button does."""
-        looks.append(0)
-        if len(looks) == 3:
-            asked.append(threading.Thread(target=line.pause))
-            asked[0].start()
-            asked[0].join(0.3)
-        return 50.0 * (len(looks) > 1)
-
-    looks: list[int] = []
-    line = Timeline(np.arange(10) / 10, clock)
-    line.play()
-    line.tick()  # past the end: the loop begins anew
-    asked[0].join()
-    assert not line.playing
-
-
-def test_one_frame_does_not_play():
-    line = Timeline(np.zeros(1), Clock())
-    line.play()
-    assert (line.playing, line.tick()) == (False, 0)
-
-
-# Curves
-
-
-def test_curves_around_a_time_have_a_line_at_it():
-    times = np.arange(100) / 10
-    chart = Chart("error", "mm", times, {"mean": times * 10, "worst": np.where(times > 3, np.nan, 2 * times)})
-    x, mean, worst, line = data_around(chart, 4.05)
-    assert len(x) == len(mean) == len(worst) == len(line)
-    assert (np.diff(x) >= 0).all()
-    assert (x[0], x[-1]) == pytest.approx((4.05 - AROUND, 4.05 + AROUND))
-    assert x[np.isfinite(line)] == pytest.approx([4.05, 4.05])
-    assert tuple(line[np.isfinite(line)]) == limits(chart)
-    known = np.isfinite(mean) & ~np.isfinite(line)
-    assert mean[known] == pytest.approx(10 * x[known])
-    assert len(data_around(chart, -50.0)[0]) == 4  # nothing is near
+def test_a_second_runs_strip_has_its_own_errors(tracked):
+    one = open_scene(tracked)
+    worse = {"mean": one.charts[0].curves["mean"] + 100}
+    strips = strips_of(side_by_side(one, replace(one, charts=(replace(one.charts[0], curves=worse),))))
+    assert np.nanmean(strips[1].error - strips[0].error) == pytest.approx(100)
 
 
 # Cameras
@@ -266,15 +207,14 @@ def test_silhouettes_show_nothing_of_the_picture(rng):
     mask[10:30, 20:40] = True
     noise = rng.integers(0, 255, (48, 64, 3)).astype(np.uint8)
     plain = Undistorter(camera, 64)
-    a, b = (frustum_image(OneFrame(image, mask), plain, 0.0, PictureMode.SILHOUETTE) for image in (noise, 255 - noise))
+    a, b = (camera_image(OneFrame(image, mask), plain, 0.0, False) for image in (noise, 255 - noise))
     assert np.array_equal(a, b)
-    assert a.shape == (48, 64, 4)
-    assert (a[20, 30, 3], a[2, 2, 3] < 60) == (255, True)
-    picture = frustum_image(OneFrame(noise, mask), plain, 0.0, PictureMode.PICTURE)
+    assert (a[20, 30], a[2, 2]) == (255, 0)
+    picture = camera_image(OneFrame(noise, mask), plain, 0.0, True)
     assert picture.shape == (48, 64, 3)
-    assert np.abs(picture[40:, :10].astype(int) - noise[40:, :10, ::-1]).max() <= 1
-    assert frustum_image(OneFrame(noise, mask), plain, 2.0, PictureMode.PICTURE) is None
-    assert frustum_image(OneFrame(noise, mask), plain, 0.0, PictureMode.NOTHING) is None
+    assert np.abs(picture[40:, :10].astype(int) - noise[40:, :10]).max() <= 1
+    assert camera_image(OneFrame(noise, mask), plain, 2.0, True) is None
+    assert camera_image(OneFrame(noise, mask), plain, 2.0, False) is None
 
 
 # Recordings
@@ -319,8 +259,8 @@ def test_a_film_whose_silhouettes_cannot_be_made_is_shown_without(rig, tmp_path)
         assert seen.mask(0.0) is None
     assert seen.mask(0.1) is None  # said once
     plain = Undistorter(seen.footage.camera, 160)
-    assert frustum_image(seen, plain, 0.0, PictureMode.PICTURE).shape == (120, 160, 3)
-    assert frustum_image(seen, plain, 0.0, PictureMode.SILHOUETTE) is None
+    assert camera_image(seen, plain, 0.0, True).shape == (120, 160, 3)
+    assert camera_image(seen, plain, 0.0, False) is None
 
 
 def test_one_camera_has_no_hull(rig):
@@ -350,7 +290,6 @@ def test_a_run_is_shown_beside_its_truth_with_errors_angles_and_particles(tracke
     ends = cloud.lines.reshape(-1, 3)
     assert np.linalg.norm(ends - joints[hand], axis=1).min() < 0.08  # some particle is where the run's own estimate was
     assert (cloud.weights.max(), cloud.weights.min() >= 0) == (1.0, True)
-    assert (cloud.ellipsoids.axes > 0).all()
     again = scene.cloud(float(scene.times[n]))
     assert np.array_equal(again.lines, cloud.lines)
 
@@ -364,8 +303,8 @@ def test_a_runs_puppet_stands_where_its_joints_are(tmp_path, name, lost):
         points = skinned(figure, n)
         assert np.linalg.norm(points[:, None] - motion.joints[n][None], axis=2).min(0).max() < 0.19
     assert [figure.at(float(time)) for time in motion.times] == [None if n in lost else n for n in range(12)]
-    spread = figure.uncertainty(7)
-    assert np.array_equal(np.sort(spread.axes.ravel()), np.sort(motion.joint_sd[7].ravel()))
+    assert np.array_equal(figure.joint_sd, motion.joint_sd, equal_nan=True)
+    assert figure.joint_names == motion.joint_names
     assert scene.notes == ()
     assert (scene.cloud, scene.hull, scene.cameras) == (None, None, ())
 
@@ -436,8 +375,7 @@ def test_all_people_of_a_run_are_shown_in_one_world(tmp_path):
     assert [(figure.name, figure.kind, figure.shift) for figure in scene.figures] == [("person 1", "estimate", (0, 0, 0)),
                                                                                       ("person 2", "estimate", (0, 0, 0))]
     assert scene.figures[0].tint != scene.figures[1].tint
-    colours = {colour_of("estimate", np.array([0.5, 0.2, 0.1]), figure.tint) for figure in scene.figures}
-    assert len(colours) == 2
+    assert np.abs(mesh_colours(scene.figures[0]) - mesh_colours(scene.figures[1])).max() > 30
     assert len(scene.times) == 14  # the second is seen from frame 2 on
     assert scene.figures[1].at(0.0) is None
     assert scene.figures[0].at(0.0) == 0
@@ -539,60 +477,93 @@ def test_what_cannot_be_shown_is_said_in_a_sentence(tmp_path, capsys):
 # The page
 
 
-def test_what_is_wished_for_is_drawn(tracked, rig):
-    pytest.importorskip("viser")
-    from shadowpuppet.viewer.web.nodes import unit_sphere
-    from shadowpuppet.viewer.web.scene_view import POINTS, SceneView, ViewOptions
-    from shadowpuppet.viewer.web.server import close_server, open_server
+def content(text: str) -> dict:
+    """The numbers within a page."""
+    return json.loads(text.partition('id="data">')[2].partition("</script>")[0])
 
-    points, faces = unit_sphere()
-    corners = points[faces]
-    assert np.linalg.norm(points, axis=1) == pytest.approx(1, abs=1e-6)
-    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert (np.einsum("fx,fx->f", outward, corners.mean(1)) > 0).all()
-    server = open_server(port=0)
-    try:
-        scene = open_scene(rig)
-        stage = SceneView(server, scene, ViewOptions(hull=True, pictures=PictureMode.PICTURE))
-        for n in (3, 9):
-            stage.to(float(scene.times[n]))
-            drawn = stage._hull.points.astype(float) + scene.middle
-            surface = scene.hull(float(scene.times[n])).points
-            assert len(drawn) == POINTS
-            assert np.linalg.norm(drawn[:100, None] - surface[None], axis=2).min(1).max() < 0.003
-            assert stage.frustums[0].handle.image.shape == (120, 160, 3)
-        near = stage.frustums[1].handle.scale
-        stage.look_through(1)
-        beyond = np.linalg.norm(scene.cameras[1].camera.centre - scene.middle)
-        assert stage.frustums[1].handle.scale / stage.frustums[1].volume > beyond
-        stage.look_through(None)
-        assert stage.frustums[1].handle.scale == pytest.approx(near)
-        stage.options.hull = stage.options.cameras = False
-        stage.to(0.5)
-        assert (stage._hull.visible, stage.frustums[0].handle.visible) == (False, False)
-        stage.close()
-        server.scene.reset()
-        stated = open_scene(tracked)
-        stage = SceneView(server, stated, ViewOptions(uncertainty=True))
-        stage.to(float(stated.times[14]))
-        assert stage._ellipsoids.batched_positions == pytest.approx(stated.figures[0].joints[14], abs=1e-5)
-        stage.close()
-        server.scene.reset()
-        scene = replace(stated, figures=(replace(stated.figures[0], joint_sd=None), *stated.figures[1:]))  # as of an older run
-        stage = SceneView(server, scene, ViewOptions(particles=True, uncertainty=True))
-        stage.to(float(scene.times[14]))
-        cloud = scene.cloud(float(scene.times[14]))
-        assert stage._ellipsoids.batched_positions == pytest.approx(cloud.ellipsoids.points, abs=1e-5)
-        assert len(stage._cloud.points) <= 150 * cloud.lines.shape[1]
-        assert stage.figures[1].frame.visible
-        stage.options.figures["truth"] = stage.options.particles = stage.options.uncertainty = False
-        stage.to(float(scene.times[14]))
-        assert (stage.figures[1].frame.visible, stage._cloud.visible, stage._ellipsoids.visible) == (False, False, False)
-        stage.to(1e6)  # nobody is there any more
-        assert not stage.figures[0].frame.visible
-        stage.close()
-    finally:
-        close_server(server)
+
+def unpacked(values: dict) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(values["data"]), f"<{values['type']}")
+
+
+def test_the_page_has_the_figures_where_they_are(tmp_path):
+    scene = open_scene(make_run(tmp_path / "run", frames=6, lost=(2,), spread=True, doubtful={4: {"left_arm": "uncertain"}}))
+    figure, data = scene.figures[0], content(page_text(scene, [], None, False))
+    (shown,) = data["figures"]
+    assert unpacked(shown["frames"]).tolist() == [0, 1, -1, 2, 3, 4]  # of the five that are known
+    J = shown["joints"]
+    places, turns = unpacked(shown["places"]).reshape(-1, J, 3), unpacked(shown["turns"]).reshape(-1, J, 4) / 32767
+    assert places[2] == pytest.approx(figure.places[3], abs=1e-5)
+    assert np.roll(turns[4], 1, axis=1) == pytest.approx(figure.quaternions[5], abs=1e-4)
+    assert unpacked(shown["named"]).reshape(5, -1, 3)[3] == pytest.approx(read_run(tmp_path / "run").motion.joints[4], abs=1e-5)
+    assert unpacked(shown["doubtful"]).reshape(5, -1)[:, LIMBS.index("left_arm")].tolist() == [0, 0, 0, 1, 0]
+    mesh = {name: unpacked(values) for name, values in shown["mesh"].items()}
+    own = mesh["joints"].astype(int)
+    assert mesh["points"].reshape(-1, 3) + figure.rest[own] == pytest.approx(figure.mesh.points, abs=1e-6)
+    colours = mesh["colours"].reshape(-1, 3)
+    for side, colour in SIDE_COLOURS.items():  # blue green red; at rest x is to the left
+        beside = figure.mesh.points[(colours == colour[::-1]).all(1), 0] * (1 if side == "left" else -1)
+        assert len(beside) > 1000
+        assert np.median(beside) > 0.1
+    assert data["moments"] == [2]
+    assert [chart["sd"] for chart in data["charts"]][-1] == {}  # these poses state none
+
+
+def test_a_truth_with_bones_is_lines(tracked):
+    truth = content(page_text(open_scene(tracked), [], None, False))["figures"][1]
+    assert truth["kind"] == "truth"
+    assert "mesh" not in truth
+    assert [truth["jointNames"][a] for a, _ in truth["bones"]].count("neck") > 1
+
+
+def test_what_a_page_may_fetch_and_texts_of_others_cannot_be_script():
+    scene = Scene(title="</script><b>run</b>", times=np.zeros(1), facts={"a": "</script><script>alert(1)</script>"})
+    alone, served = page_text(scene, [], [], False), page_text(scene, [], None, False)
+    for page in (alone, served):
+        assert "<b>" not in page
+        assert page.count("</script>") == 2
+        assert "default-src 'none'" in page
+        assert "https:" not in page
+        assert content(page)["title"] == scene.title
+    assert "connect-src 'none'" in alone
+    assert "connect-src 'self'" in served
+    assert "'unsafe" not in alone + served
+
+
+def test_a_file_has_pictures_only_where_they_are_asked_for(tracked, tmp_path):
+    """What is in the file: silhouettes of two colours, or pictures."""
+    scene = cut_scene(open_scene(tracked), 0.0, 0.2)
+    found = {}
+    for asked in (False, True):
+        data = content(write_page(tmp_path / f"{asked}.html", scene, asked).read_text())
+        (images,) = data["images"]
+        assert len(images) == len(unpacked(data["times"]))
+        kind, _, text = images[0].partition(";base64,")
+        found[kind] = cv2.imdecode(np.frombuffer(base64.b64decode(text), np.uint8), cv2.IMREAD_UNCHANGED)
+    assert set(found) == {"data:image/png", "data:image/jpeg"}
+    assert set(np.unique(found["data:image/png"])) == {0, 255}
+    assert found["data:image/jpeg"].ndim == 3
+
+
+def test_what_the_page_asks_for_is_made(tracked, rig):
+    scene = open_scene(rig)
+    page = ScenePage(scene)
+    points = np.frombuffer(page.part("/hull/9")[0], "<f4").reshape(-1, 4)
+    surface = scene.hull(float(scene.times[9]))
+    off = np.linalg.norm(points[:100, None, :3] - surface.points[None], axis=2).min(1)
+    assert off.max() < 1e-5
+    assert set(np.unique(points[:, 3])) <= set(range(made_rig.CAMERAS))
+    for kind, shape in (("silhouettes", (120, 160)), ("pictures", (120, 160, 3))):
+        data, name = page.part(f"/image/1/9/{kind}")
+        assert cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED).shape == shape
+        assert name.startswith("image/")
+    for path in ("/image/9/9/pictures", "/image/1/999/pictures", "/image/1/9/faces", "/image/-1/9/pictures", "/hull/x", "/hull",
+                 "/particles/3", "/../secret", "/image/1/٣/pictures"):  # fmt: skip
+        assert page.part(path) is None
+    run = open_scene(tracked)
+    cloud, lines = run.cloud(float(run.times[14])), np.frombuffer(ScenePage(run).part("/particles/14")[0], "<f4").reshape(-1, 7)
+    assert lines[-1, 6] == pytest.approx(1)
+    assert lines[-1, :6] == pytest.approx(cloud.lines[np.argmax(cloud.weights), -1].ravel(), abs=1e-5)
 
 
 @pytest.mark.parametrize("person", [True, False])
@@ -610,7 +581,7 @@ def test_limbs_that_are_not_vouched_for_are_pale_in_their_frames(tmp_path, perso
     try:
         stage = SceneView(server, scene)
         for n in (0, 3, 2, 4):
-            stage.to(float(scene.times[n]))
+            stage.figures[0].to(float(scene.times[n]), True)
             for part in stage.figures[0].parts:
                 limb = LIMBS[part.limb]
                 pale = limb in doubtful.get(n, {})
@@ -619,7 +590,6 @@ def test_limbs_that_are_not_vouched_for_are_pale_in_their_frames(tmp_path, perso
                 assert part.pale is None or part.pale.visible == pale
                 at = (part.pale if pale else part.solid).bones[0].position
                 assert at == pytest.approx(figure.places[n, part.joints[0]], abs=1e-5)
-        stage.close()
     finally:
         close_server(server)
 
@@ -638,20 +608,33 @@ def test_a_live_figure_is_pale_where_its_view_is(rng):
         assert figure.doubtful.named(0) == named
 
 
-def test_a_file_says_what_may_be_fetched_and_its_title():
-    page = sealed_page("<!doctype html><html><head><title>Viser</title></head><body></body></html>", "<b>run</b>")
-    assert "default-src 'none'" in page
-    assert "<title>&lt;b&gt;run&lt;/b&gt;</title>" in page
-    assert "https:" not in page
-
-
 def test_a_file_has_no_more_frames_than_are_seen():
     assert len(kept_frames(np.arange(120) / 60)) == 60
     assert len(kept_frames(np.arange(50) / 25)) == 50
     assert len(kept_frames(np.zeros(1))) == 1
 
 
-def test_other_sites_pages_and_names_are_refused():
+def test_the_page_is_for_its_own_machine_and_itself(rig):
+    import urllib.error
+    import urllib.request
+
+    scene = open_scene(rig)
+    with serving(scene, port=0) as address:
+        with urllib.request.urlopen(f"{address}image/0/0/silhouettes") as answer:
+            assert (answer.status, answer.headers["Cross-Origin-Resource-Policy"]) == (200, "same-origin")
+        for headers, code in (({"Host": "evil.example"}, 421), ({"Origin": "http://evil.example"}, 403)):
+            with pytest.raises(urllib.error.HTTPError) as refused:
+                urllib.request.urlopen(urllib.request.Request(address, headers=headers))
+            refused.value.close()
+            assert refused.value.code == code
+        with pytest.raises(urllib.error.HTTPError, match="404") as refused:
+            urllib.request.urlopen(f"{address}etc/passwd")
+        refused.value.close()
+        with pytest.raises(SettingsError, match="free port"), serving(scene, port=int(address.rstrip("/").rpartition(":")[2])):
+            pass
+
+
+def test_live_pages_of_other_sites_and_names_are_refused():
     pytest.importorskip("viser")
     import urllib.error
     import urllib.request
@@ -669,8 +652,9 @@ def test_other_sites_pages_and_names_are_refused():
             policy = answer.headers["Content-Security-Policy"]
             assert (answer.status, "frame-ancestors 'none'" in policy, "http" in policy) == (200, True, False)
         strange = urllib.request.Request(address, headers={"Host": "evil.example"})
-        with pytest.raises(urllib.error.HTTPError, match="403"):
+        with pytest.raises(urllib.error.HTTPError, match="403") as refused:
             urllib.request.urlopen(strange)
+        refused.value.close()
         protocol = _protocol()
         socket = f"ws://127.0.0.1:{port}"
         with connect(socket, subprotocols=[protocol], origin=f"http://127.0.0.1:{port}") as ours:
@@ -782,11 +766,13 @@ def test_servers_that_begin_at_once_are_guarded_one_after_another(monkeypatch):
     assert library.serve is plain
 
 
-def test_without_viser_the_command_says_how_to_get_it(tmp_path):
+def test_the_viewer_needs_no_extra_and_a_live_one_says_how_to_get_it(tmp_path):
+    run = make_run(tmp_path / "run", frames=3)
     code = ("import sys; sys.modules['viser'] = None\n"
             "import importlib.util as u; find = u.find_spec\n"
             "u.find_spec = lambda name, *a: None if name == 'viser' else find(name, *a)\n"
-            f"from shadowpuppet.cli.app import run; sys.exit(run(['view', {str(tmp_path)!r}]))")  # fmt: skip
+            f"from shadowpuppet.cli.app import run; code = run(['view', {str(run)!r}, '--quiet', '--html', {str(tmp_path / 'a.html')!r}])\n"
+            f"assert code == 0; sys.exit(run(['live', {str(tmp_path / 'none.mp4')!r}, '--show', 'viewer']))")  # fmt: skip
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 2
     assert "pip install 'shadowpuppet[view]'" in done.stderr

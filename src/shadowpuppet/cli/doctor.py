@@ -27,7 +27,7 @@ OLDEST_PYTHON = (3, 11)
 MODULES = {"opencv-python-headless": "cv2", "python-osc": "pythonosc"}
 """Import names of distributions, where they differ."""
 EXTRAS = {
-    "view": (("viser",), "the viewer"), "report": (("matplotlib",), "pages and plots about runs"),
+    "view": (("viser",), "`live --show viewer`"), "report": (("matplotlib",), "pages and plots about runs"),
     "formats": (("pyarrow",), "Parquet"), "batch": (("distributed",), "many runs on a cluster"),
     "live": (("websockets",), "live motion over a WebSocket"), "lsl": (("pylsl",), "live motion for the lab streaming layer"),
 }  # fmt: skip

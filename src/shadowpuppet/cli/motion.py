@@ -64,6 +64,7 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
            folder: Annotated[Path | None, output("Folder of the files. [default: export/ in the run's]")] = None,
            unit: Literal["m", "cm", "mm"] | None = None, missing: Literal["nan", "drop", "fill"] = "nan",
            model: Literal["rajagopal", "gait2392", "pose2sim", "own"] = "rajagopal", weight: float | None = None,
+           rest: Literal["t", "a", "hang"] = "hang", names: Literal["mixamo", "humanik", "unreal", "vrm"] | None = None,
            quiet: Quiet = False) -> None:  # fmt: skip
     """Write a run's motion for other programs: Blender, OpenSim, C3D viewers, game engines, pandas.
 
@@ -77,6 +78,10 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
         OpenSim model whose coordinates .mot files have: Rajagopal 2016, gait2392, Pose2Sim's, or the .osim file of this command (own).
     weight
         Of the person, kilograms, for the masses in .osim files. [default: average build]
+    rest
+        Rest pose of the skeleton in .bvh, .glb and .usda files: arms aside, half down, or hanging.
+    names
+        Program whose names its bones have: Mixamo, HumanIK, Unreal 5 or VRM 1.0. [default: our joints' names]
     """
     from importlib.util import find_spec
 
@@ -86,16 +91,16 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
     from shadowpuppet.io.run import read_run
 
     one = next(iter(person_folders(run).values()), run)
-    names = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
+    formats = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
     with terminal(quiet) as listener:
         if to == "all" and find_spec("pyarrow") is None:
-            names.remove("parquet")
+            formats.remove("parquet")
             listener.warn("parquet is left out: it needs pyarrow; pip install 'shadowpuppet[formats]'")
         if to == "all" and read_run(one).motion.body_name not in WHOLE:
-            names.remove("osim")
+            formats.remove("osim")
             listener.warn("osim is left out: only whole bodies have bones of constant lengths, as an OpenSim model needs")
         listener.begin("exporting")
-        written = export_run(run, names, folder, unit, missing, model, weight)
+        written = export_run(run, formats, folder, unit, missing, model, weight, rest, names)
     if not quiet:
         level = read_run(one).floor
         side = "below" if level < 0 else "above"

@@ -43,16 +43,13 @@ def view(what: Annotated[Path, Parameter(help="Folder of a run or a recording, f
     """Look at a run, a recording, a prior or a file in space and time, on a page for a browser: the puppet, the truth, cameras and their
     films, hull points, particles, angles and errors. Ctrl-C ends it."""
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.viewer.web.server import check_viser
 
-    check_viser()
     _check(other, beside, html, pictures, port)
     options = options_from(flags, config)
     with terminal(quiet) as listener:
         from shadowpuppet.viewer.scene.of_run import side_by_side
         from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
         from shadowpuppet.viewer.web.page import check_page, write_page
-        from shadowpuppet.viewer.web.serve import default_view
 
         if html is not None:
             check_page(html)
@@ -66,7 +63,7 @@ def view(what: Annotated[Path, Parameter(help="Folder of a run or a recording, f
         if html is None:
             listener.stop()
             return _serve(scene, listen, port, not no_open, quiet)
-        write_page(html, scene, default_view(scene, pictures), listener)
+        write_page(html, scene, pictures, listener)
     if not quiet:
         print(f"made  {html}, {html.stat().st_size / 1e6:.1f} MB")
 
@@ -95,4 +92,4 @@ def _serve(scene: Scene, listen: str, port: int | None, opening: bool, quiet: bo
             open_browser(address)
 
     with contextlib.suppress(KeyboardInterrupt):
-        serve_scene(scene, listen, port, ready=ready)
+        serve_scene(scene, listen, port, ready)

@@ -20,6 +20,8 @@ from shadowpuppet.io.motion import EXPORTS, READABLE
 from shadowpuppet.io.motion.bvh_writer import write_bvh
 from shadowpuppet.io.motion.c3d import read_header
 from shadowpuppet.io.motion.c3d_writer import MAX_RESIDUAL, MM, write_c3d
+from shadowpuppet.io.motion.characters.bone_names import bone_names, with_bone_names
+from shadowpuppet.io.motion.characters.usd import write_usda
 from shadowpuppet.io.motion.glb import write_glb
 from shadowpuppet.io.motion.joint_names import read_names
 from shadowpuppet.io.motion.motion_files import read_motion
@@ -43,6 +45,7 @@ from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.limbs import DOUBTFUL, limb_of
 from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
 from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.rest_pose import RAISED, with_rest
 
 TOLERANCE = 1e-3
 """Distance, metres, between the exported skeleton's joints and the run's above which a warning is given."""
@@ -61,9 +64,14 @@ class Layout(NamedTuple):
     """Model, of `MODELS`, whose coordinates MOT files have."""
     weight: float | None = None
     """Of the person, kilograms, for .osim files; None: of average build."""
+    rest: str = "hang"
+    """Rest pose, of `RAISED`, of skeletons."""
+    names: str | None = None
+    """Program, of `OF_PROGRAMS`, whose names their bones have; None: ours."""
 
     @classmethod
-    def checked(cls, unit: str | None, missing: str, model: str = "rajagopal", weight: float | None = None) -> Layout:
+    def checked(cls, unit: str | None, missing: str, model: str = "rajagopal", weight: float | None = None, rest: str = "hang",
+                names: str | None = None) -> Layout:
         """A layout. Raises `SettingsError` if a choice is unknown."""
         if unit is not None and unit not in METRES:
             raise SettingsError(f"unit: found {unit!r}, expected one of {choices(METRES)}")
@@ -73,7 +81,23 @@ class Layout(NamedTuple):
             raise SettingsError(f"model: found {model!r}, expected one of {choices(MODELS)}")
         if weight is not None and not 1 <= weight <= 500:
             raise SettingsError(f"weight: found {weight}, expected kilograms from 1 to 500")
-        return cls(unit, missing, model, weight)
+        if rest not in RAISED:
+            raise SettingsError(f"rest: found {rest!r}, expected one of {choices(RAISED)}")
+        if names is not None:
+            bone_names(names)
+        return cls(unit, missing, model, weight, rest, names)
+
+    def posed(self, puppet: Puppet) -> Puppet:
+        """A puppet with this rest pose."""
+        if self.rest == "hang":
+            return puppet
+        animation, mesh = with_rest(puppet.animation, puppet.mesh, self.rest)
+        return puppet._replace(animation=animation, mesh=mesh)
+
+    def character(self, puppet: Puppet) -> Puppet:
+        """A puppet with this rest pose and these names."""
+        posed = self.posed(puppet)
+        return posed._replace(animation=with_bone_names(posed.animation, self.names))
 
 
 class Puppet(NamedTuple):
@@ -86,7 +110,8 @@ class Puppet(NamedTuple):
 
 
 def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | None = None, unit: str | None = None,
-               missing: str = "nan", model: str = "rajagopal", weight: float | None = None) -> list[Path]:
+               missing: str = "nan", model: str = "rajagopal", weight: float | None = None, rest: str = "hang",
+               names: str | None = None) -> list[Path]:
     """Write a run's motion as `<run>.<format>` for each of `formats`; returns the files' paths. Of several people a file each,
     `<run>-person-1.<format>`, ...
 
@@ -102,11 +127,13 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
         missing: what TRC files have for unknown positions: nan, drop or fill, as in `write_trc`.
         model: of `MODELS`, whose coordinates MOT files have.
         weight: of the person, kilograms, for .osim files (default: average build).
+        rest: rest pose of skeletons (BVH, GLB, USDA), of `RAISED`.
+        names: program whose names their bones have, of `OF_PROGRAMS` (default: ours).
     """
     unknown = [name for name in formats if name not in EXPORTS]
     if unknown or not formats:
         raise SettingsError(f"formats: found {unknown[0] if unknown else 'none'!r}, expected some of {choices(EXPORTS)}")
-    layout, whole = Layout.checked(unit, missing, model, weight), Path(folder).resolve().name
+    layout, whole = Layout.checked(unit, missing, model, weight, rest, names), Path(folder).resolve().name
     people = {f"{whole}-{path.name}": path for path in person_folders(folder).values()} or {whole: Path(folder)}
     exports = {name: _RunExport(_on_floor(read_run(path)), layout) for name, path in people.items()}
     known = {name: export for name, export in exports.items() if np.isfinite(export.run.motion.joints).all(2).any()}
@@ -131,8 +158,8 @@ def convert_motion(source: str | Path, target: str | Path, *, own_names: bool = 
                    target_unit: str | None = None, missing: str = "nan", names: str | Path | None = None) -> str:
     """Convert a motion file (ending in `READABLE`) to another format (ending in `EXPORTS`); returns a summary of what was written.
 
-    Skeletons of .bvh and .amc files are kept in .bvh and .glb files. Otherwise, if the target holds a skeleton, the poses of a whole body
-    are fitted to the joints (`fit_poses`), and the summary states the residual. Raises a `ShadowPuppetError` if a file cannot be
+    Skeletons of .bvh and .amc files are kept in .bvh, .glb and .usda files. Otherwise, if the target holds a skeleton, the poses of a
+    whole body are fitted to the joints (`fit_poses`), and the summary states the residual. Raises a `ShadowPuppetError` if a file cannot be
     read or written, or the joints are too few for a body.
 
     Args:
@@ -201,7 +228,8 @@ class _RunExport:
         """The body with the sizes in person.toml."""
         path, name = self.run.folder / "person.toml", self.run.motion.body_name
         if not path.exists():
-            raise FormatError(f"{path}: found no such file, expected the person's sizes, which BVH, GLB and MOT need; other formats do not")
+            raise FormatError(f"{path}: found no such file, expected the person's sizes, which BVH, GLB, USDA and MOT need; others "
+                              "do not")
         return make_body(name, read_person(path, name).sizes)
 
     @cached_property
@@ -298,6 +326,20 @@ def _write_model(path: Path, puppet: Puppet, layout: Layout) -> None:
     write_osim(path, puppet.body, puppet.animation, layout.weight)
 
 
+def _write_bvh(path: Path, puppet: Puppet, layout: Layout) -> None:
+    write_bvh(path, layout.posed(puppet).animation, layout.unit or "m", layout.names)
+
+
+def _write_glb(path: Path, puppet: Puppet, layout: Layout, smoothing: str = "") -> None:
+    moved = layout.character(puppet)
+    write_glb(path, moved.animation, moved.mesh, smoothing, at_rest=layout.rest != "hang")
+
+
+def _write_usda(path: Path, puppet: Puppet, layout: Layout, smoothing: str = "") -> None:
+    moved = layout.character(puppet)
+    write_usda(path, moved.animation, moved.mesh, smoothing)
+
+
 FORMATS = {
     "c3d": Format(lambda export, path: write_c3d(path, export.run.motion.table, export.spread, export.angles, export.smoothing,
                                                  export.events),
@@ -306,9 +348,11 @@ FORMATS = {
     "csv": Format(lambda export, path: write_columns(path, motion_columns(export.run.motion)),
                   lambda path, table, layout: write_joints(path, table)),
     "npz": Format(lambda export, path: write_motion_npz(path, export.run.motion), lambda path, table, layout: write_npz(path, table)),
-    "bvh": Format(skeleton=lambda path, puppet, layout: write_bvh(path, puppet.animation, layout.unit or "m"), any_skeleton=True),
-    "glb": Format(lambda export, path: write_glb(path, export.animation, body_mesh(export.body), export.smoothing),
-                  skeleton=lambda path, puppet, layout: write_glb(path, puppet.animation, puppet.mesh), any_skeleton=True),
+    "bvh": Format(skeleton=_write_bvh, any_skeleton=True),
+    "glb": Format(lambda export, path: _write_glb(path, export.puppet, export.layout, export.smoothing), skeleton=_write_glb,
+                  any_skeleton=True),
+    "usda": Format(lambda export, path: _write_usda(path, export.puppet, export.layout, export.smoothing), skeleton=_write_usda,
+                   any_skeleton=True),
     "mot": Format(lambda export, path: _write_coordinates(path, export.puppet, export.layout, export.smoothing),
                   skeleton=_write_coordinates),
     "osim": Format(skeleton=_write_model),

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Body, Hulls, Limbs, Quads
+from shadowpuppet.camera.drawing import MIDDLE_COLOUR as DRAWN_MIDDLE
+from shadowpuppet.camera.drawing import SIDE_COLOURS, Colour
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.animation import Animation, rest_positions
 from shadowpuppet.motion.body_animation import TO_REST, BodyTree
@@ -17,8 +19,16 @@ POINTS_AROUND, RINGS_ALONG, DOME_RINGS = 24, 6, 5
 """Number of points around a limb, of rings along it, and of rings of a dome."""
 BALL_RINGS = 10
 """Number of rings of an ellipsoid."""
-LEFT_COLOUR, RIGHT_COLOUR, MIDDLE_COLOUR = (0.86, 0.48, 0.30), (0.30, 0.56, 0.80), (0.72, 0.72, 0.70)
-"""Colours that make a mirror image obvious, linear RGB."""
+
+
+def linear(colour: Colour) -> tuple[float, float, float]:
+    """Linear red, green, blue, 0..1, of a colour of the overlay: blue, green, red, 0..255 (sRGB)."""
+    red, green, blue = (part / 255 / 12.92 if part < 11 else ((part / 255 + 0.055) / 1.055) ** 2.4 for part in colour[::-1])
+    return red, green, blue
+
+
+LEFT_COLOUR, RIGHT_COLOUR, MIDDLE_COLOUR = linear(SIDE_COLOURS["left"]), linear(SIDE_COLOURS["right"]), linear(DRAWN_MIDDLE)
+"""The overlay's colours, which make a mirror image obvious."""
 BONE_THICKNESS = 0.12
 """Radius of a bone of unknown shape, as a share of its length."""
 MAX_BONE_RADIUS = 0.05

@@ -23,6 +23,8 @@ BLUE, ORANGE, GREEN, PINK, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#
 SIDES = {"left": GREEN, "right": PINK}
 STATUSES = {"tracked": "#dfe6ee", "uncertain": "#F0C75E", "predicted": "#9ECAE1", "lost": ORANGE, "absent": "#b9bdc4"}
 WAYS = {"none": ("as it stands", BLUE, "-"), "root": ("from the root", GREEN, "--"), "rigid": ("each frame moved and turned", ORANGE, "-.")}
+READABLE = 1.1
+"""Least size at which charts are shown: narrower pages scroll them sideways, so that letters stay readable."""
 POINTS = 1200
 """Greatest number of points of a line; more do not show."""
 COLUMNS = 3
@@ -290,8 +292,9 @@ def _svg(figure: Any, name: str) -> str:
     text = out.getvalue()
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     text = re.sub(r'(\bid="|"#|url\(#)', lambda found: f"{found[1]}{name}-", text)
-    return re.sub(r'<svg [^>]*?viewBox="([^"]*)"[^>]*>', r'<svg viewBox="\1" role="img" xmlns="http://www.w3.org/2000/svg" '
-                  r'xmlns:xlink="http://www.w3.org/1999/xlink">', text, count=1)
+    least = READABLE * 72 * figure.get_size_inches()[0]
+    return re.sub(r'<svg [^>]*?viewBox="([^"]*)"[^>]*>', rf'<svg viewBox="\1" style="min-width:{least:.0f}px" role="img" '
+                  r'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">', text, count=1)
 
 
 def _spread(errors: Array) -> list[Array]:

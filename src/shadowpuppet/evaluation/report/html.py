@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
@@ -15,7 +16,7 @@ def document(title: str, parts: Iterable[str]) -> str:
     css = files("shadowpuppet.evaluation.report").joinpath("page.css").read_text("utf-8")
     return (f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
             f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{plain(title)}</title>\n'
-            f"<style>\n{css}</style></head>\n<body>\n" + "\n".join(parts) + "\n</body></html>\n")
+            f"<style>\n{css}</style></head>\n<body><main>\n" + "\n".join(parts) + "\n</main></body></html>\n")
 
 
 def plain(text: object) -> str:
@@ -24,8 +25,15 @@ def plain(text: object) -> str:
 
 
 def figure(svg: str, caption: str) -> str:
-    """A plot with a caption."""
-    return f"<figure>{svg}<figcaption>{caption}</figcaption></figure>"
+    """A plot with a caption, which also describes it to those who cannot see it."""
+    said = plain(re.sub(r"<[^>]*>", "", caption).partition(". ")[0])
+    named = svg if "aria-label" in svg else svg.replace('role="img"', f'role="img" aria-label="{said}"', 1)
+    return f"<figure>{scrolled(named, said)}<figcaption>{caption}</figcaption></figure>"
+
+
+def scrolled(content: str, name: str) -> str:
+    """What may be wider than a phone's screen, and scrolls by itself there; also by keys. `name`: escaped."""
+    return f'<div class="scroll" role="region" aria-label="{name}" tabindex="0">{content}</div>'
 
 
 def rows(cells: Iterable[Sequence[str]], sums: int = 0) -> str:
@@ -37,8 +45,9 @@ def rows(cells: Iterable[Sequence[str]], sums: int = 0) -> str:
 
 def table(head: Sequence[str], body: str) -> str:
     """A table with a head."""
-    return (f'<div class="scroll"><table><thead><tr><th>{"</th><th>".join(map(plain, head))}</th></tr></thead><tbody>{body}</tbody></table>'
-            "</div>")
+    cells = "".join(f"<th>{plain(name)}</th>" if name else "<td></td>" for name in head)
+    name = plain(", ".join(filter(None, head)))
+    return scrolled(f"<table><thead><tr>{cells}</tr></thead><tbody>{body}</tbody></table>", f"Table: {name}")
 
 
 def definitions(pairs: Iterable[tuple[str, str]]) -> str:

@@ -13,7 +13,7 @@ from shadowpuppet.evaluation.evaluation import Evaluation, check_output
 from shadowpuppet.evaluation.interval_coverage import LEVELS
 from shadowpuppet.evaluation.movement.movement import movement_of
 from shadowpuppet.evaluation.report import charts
-from shadowpuppet.evaluation.report.html import document, figure, plain, rows, table
+from shadowpuppet.evaluation.report.html import document, figure, plain, rows, scrolled, table
 from shadowpuppet.evaluation.report.movement_section import movement_section
 from shadowpuppet.evaluation.report.pictures import ReportFrame, pictures, report_frames
 from shadowpuppet.evaluation.report.sections import (
@@ -129,7 +129,8 @@ def _shot(of: Evaluation, each: ReportFrame, image: bytes) -> str:
     worst = ", ".join(f"{plain(name.replace('_', ' '))} {off:.0f}" for name, off in each.worst)
     error = f"<b>{each.error:.0f} mm</b> in the mean; farthest off: {worst}. " if each.error == each.error else ""
     data = base64.b64encode(image).decode()
-    return (f'<figure><img alt="frame {each.frame}" src="data:image/jpeg;base64,{data}"><figcaption><span class="badge'
+    shot = scrolled(f'<img alt="frame {each.frame}" src="data:image/jpeg;base64,{data}">', f"Frame {each.frame}")
+    return (f'<figure>{shot}<figcaption><span class="badge'
             f'{" usual" if each.typical else ""}">{each.letter}</span> {error}{", ".join(note)}{", a usual frame" if each.typical else ""}'
             "</figcaption></figure>")
 

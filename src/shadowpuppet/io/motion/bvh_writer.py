@@ -12,6 +12,7 @@ from shadowpuppet.errors import ShadowPuppetError, choices, warn
 from shadowpuppet.geometry import Array, clear_order, continuous_angles
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.motion.characters.bone_names import with_bone_names
 from shadowpuppet.io.motion.trc import METRES
 from shadowpuppet.motion.animation import Y_UP, Animation
 from shadowpuppet.motion.constant_bones import STILL, constant_bones
@@ -22,14 +23,15 @@ UNKNOWN_END = (0.0, 0.0, 0.0)
 """End site of a leaf joint if its end is unknown."""
 
 
-def write_bvh(path: str | Path, animation: Animation, unit: str = "m") -> None:
+def write_bvh(path: str | Path, animation: Animation, unit: str = "m", names: str | None = None) -> None:
     """Write an animated skeleton: constant offsets, Euler angles in degrees, Y up.
 
     The format has neither gaps nor times: unknown frames are interpolated, and frames at a varying rate are resampled, each with a
     warning. All joints rotate in one order: about Z, X, Y if these stay away from their singularity, else the order that stays farthest
     from it. Only the root has position channels: other joints that move hang on joints of their own, see `constant_bones`. Many readers
-    take the first joint's channels for all, and ignore or refuse positions below the root. `unit`: m (as Blender expects), cm or mm. Raises
-    `ShadowPuppetError` if no frame is known or the file cannot be written.
+    take the first joint's channels for all, and ignore or refuse positions below the root. `unit`: m (as Blender expects), cm or mm.
+    `names`: of the program, of `OF_PROGRAMS`, whose names our joints get. Raises `ShadowPuppetError` if no frame is known or the file
+    cannot be written.
     """
     path = Path(path)
     if unit not in METRES:
@@ -41,6 +43,7 @@ def write_bvh(path: str | Path, animation: Animation, unit: str = "m") -> None:
     animation, off = constant_bones(animation)
     if off > STILL:
         warn(f"{path}: joints lie up to {1000 * off:.1f} mm off, as bones keep their lengths in this format")
+    animation = with_bone_names(animation, names)
     turns = animation.rotations.copy()
     turns[:, 0] = Y_UP @ turns[:, 0]
     order, axes = _depth_first(animation), clear_order(turns.reshape(-1, 3, 3))

@@ -25,12 +25,13 @@ MIN_ROTATION = 1e-7
 """Difference of rotation matrices from the identity below which a joint is not animated."""
 
 
-def write_glb(path: str | Path, animation: Animation, mesh: Mesh, smoothing: str = "") -> None:
+def write_glb(path: str | Path, animation: Animation, mesh: Mesh, smoothing: str = "", at_rest: bool = False) -> None:
     """Write a skinned mesh and its animation: metres, Y up, times from 0.
 
     Unknown frames have no keys: the puppet's scale is 0 there, which hides it, and `extras.unknown` of the animation lists them as pairs
-    of seconds, from and to; a warning says so. `smoothing`: how the motion was smoothed, written to `asset.extras`. Raises
-    `ShadowPuppetError` if no frame is known or the file cannot be written.
+    of seconds, from and to; a warning says so. `smoothing`: how the motion was smoothed, written to `asset.extras`. `at_rest`: nodes stand
+    in the rest pose, feet on the floor, rather than in the first frame's. Raises `ShadowPuppetError` if no frame is known or the file
+    cannot be written.
     """
     path, known = Path(path), np.flatnonzero(animation.known)
     if not len(known):
@@ -42,7 +43,7 @@ def write_glb(path: str | Path, animation: Animation, mesh: Mesh, smoothing: str
     primitive = _primitive(buffer, mesh)
     skin = buffer.add(_inverse_bind(animation), "MAT4", FLOAT)
     motion = _motion(buffer, animation, known)
-    joints = _nodes(animation, int(known[0]))
+    joints = _nodes(animation, None if at_rest else int(known[0]))
     content = {
         "asset": {"version": "2.0", "generator": "shadowpuppet", **({"extras": {"smoothing": smoothing}} if smoothing else {})},
         "scene": 0, "scenes": [{"nodes": [0, 1]}],
@@ -101,13 +102,17 @@ def _inverse_bind(animation: Animation) -> Array:
     return np.swapaxes(matrices, 1, 2)
 
 
-def _nodes(animation: Animation, frame: int) -> list[dict[str, Any]]:
-    """A node for each joint, posed as in `frame` for viewers without animation."""
-    shifts = _shifts(animation)
+def _nodes(animation: Animation, frame: int | None) -> list[dict[str, Any]]:
+    """A node for each joint, posed as in `frame` for viewers without animation; None: at rest, the lowest joint on the floor."""
+    if frame is None:
+        shifts, turns = animation.offsets.copy(), np.tile([0.0, 0, 0, 1.0], (len(animation.names), 1))
+        shifts[0, 1] = -animation.rest[:, 1].min()
+    else:
+        shifts = _shifts(animation)[frame]
+        turns = np.concatenate([quaternions(_turns(animation, j)[[frame]]) for j in range(len(animation.names))])
     nodes = []
     for j, name in enumerate(animation.names):
-        turns = quaternions(_turns(animation, j)[[frame]])[0]
-        node: dict[str, Any] = {"name": name, "translation": shifts[frame, j].tolist(), "rotation": turns.tolist()}
+        node: dict[str, Any] = {"name": name, "translation": shifts[j].tolist(), "rotation": turns[j].tolist()}
         children = [child + 1 for child, parent in enumerate(animation.parents) if parent == j]
         nodes.append(node | ({"children": children} if children else {}))
     return nodes

@@ -2,30 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import socket
 import threading
 import time
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
 from typing import Any, Self
 from urllib.parse import urlsplit
 
 from shadowpuppet.live.display.drawing import drawn, jpeg
 from shadowpuppet.live.display.view import COMMANDS, Display, View
-from shadowpuppet.network import (
-    MAX_CONNECTIONS,
-    REQUEST_SECONDS,
-    address_family,
-    is_loopback,
-    is_own_host,
-    open_browser,
-    open_page,
-    page_headers,
-    shown_host,
-)
+from shadowpuppet.network import open_browser, open_page, page_headers, shown_host
+from shadowpuppet.page_server import PageHandler, PageServer
 
 PORT = 8600
 """Default port; another free one if it is taken."""
@@ -107,114 +95,48 @@ class WebDisplay(Display):
             return self._drawn[1]
 
 
-class _Server(ThreadingHTTPServer):
-    daemon_threads = True
-    allow_reuse_address = False
-
+class _Server(PageServer):
     def __init__(self, display: WebDisplay, listen: str, port: int) -> None:
-        self._free = threading.Semaphore(MAX_CONNECTIONS)
-        self.display, self.loopback, self.address_family = display, is_loopback(listen), address_family(listen)
-        super().__init__((listen, port), _Handler)
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Answer in a thread of its own, or close the connection if there are `MAX_CONNECTIONS` already."""
-        if self._free.acquire(blocking=False):
-            super().process_request(request, client_address)
-        else:
-            self.shutdown_request(request)
-
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Answer, in the thread."""
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self._free.release()
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """Ignore connections that a browser closed."""
+        self.display = display
+        super().__init__(_Handler, listen, port)
 
 
-class _Handler(BaseHTTPRequestHandler):
+class _Handler(PageHandler):
     server: _Server  # pyright: ignore[reportIncompatibleVariableOverride]
-    server_version, sys_version = "shadowpuppet", ""
-    timeout = 30
-
-    def handle_one_request(self) -> None:
-        """Answer one request; the connection is closed if it has not come within `REQUEST_SECONDS`, however slowly it comes."""
-        self._ending = threading.Timer(REQUEST_SECONDS, self._end)
-        self._ending.daemon = True
-        self._ending.start()
-        try:
-            super().handle_one_request()
-        finally:
-            self._ending.cancel()
-
-    def parse_request(self) -> bool:
-        """Read the request's headers."""
-        try:
-            return super().parse_request()
-        finally:
-            self._ending.cancel()
-
-    def _end(self) -> None:
-        with contextlib.suppress(OSError):
-            self.connection.shutdown(socket.SHUT_RDWR)
-
-    def log_message(self, format: str, *args: Any) -> None:
-        """Log nothing."""
+    page_headers = HEADERS
 
     def do_GET(self) -> None:
         """Answer with a file of the page, a picture, or a stream of pictures or figures."""
         path = urlsplit(self.path).path
-        if not self._accepted():
+        if not self.is_accepted():
             return
         if path in PAGE:
             name, kind = PAGE[path]
-            self._answer(files("shadowpuppet.live.display").joinpath(name).read_bytes(), f"{kind}; charset=utf-8")
+            self.answer(files("shadowpuppet.live.display").joinpath(name).read_bytes(), f"{kind}; charset=utf-8")
         elif path == "/picture.jpg":
-            self._answer(self.server.display.picture(*self.server.display.next(0, 0.0)), "image/jpeg")
+            self.answer(self.server.display.picture(*self.server.display.next(0, 0.0)), "image/jpeg")
         elif path == "/picture.mjpeg":
-            self._begin(f"multipart/x-mixed-replace; boundary={BOUNDARY}")
+            self.begin(f"multipart/x-mixed-replace; boundary={BOUNDARY}")
             self.wfile.write(f"--{BOUNDARY}\r\n".encode())
             self._follow(self._picture)
         elif path == "/events":
-            self._begin("text/event-stream")
+            self.begin("text/event-stream")
             self._follow(self._figures)
         else:
-            self._refuse(HTTPStatus.NOT_FOUND, "no such page")
+            self.refuse(HTTPStatus.NOT_FOUND, "no such page")
 
     def do_POST(self) -> None:
         """Store the command of a button or key of the page."""
         command = urlsplit(self.path).path.removeprefix("/command/")
-        if not self._accepted():
+        if not self.is_accepted():
             return
         if COMMAND_HEADER not in self.headers:
-            self._refuse(HTTPStatus.FORBIDDEN, "only the page itself may ask this")
+            self.refuse(HTTPStatus.FORBIDDEN, "only the page itself may ask this")
         elif command not in COMMANDS:
-            self._refuse(HTTPStatus.NOT_FOUND, "no such command")
+            self.refuse(HTTPStatus.NOT_FOUND, "no such command")
         else:
             self.server.display.press(command)
-            self._answer(b"", "text/plain")
-
-    def _accepted(self) -> bool:
-        """Whether the request names this machine as its host; else it is refused."""
-        if is_own_host(self.headers, self.server.loopback):
-            return True
-        self._refuse(HTTPStatus.MISDIRECTED_REQUEST, "this page is served under the machine's own address only")
-        return False
-
-    def _answer(self, body: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
-        self._begin(kind, status, len(body))
-        self.wfile.write(body)
-
-    def _refuse(self, status: HTTPStatus, why: str) -> None:
-        self._answer(f"{why}\n".encode(), "text/plain; charset=utf-8", status)
-
-    def _begin(self, kind: str, status: HTTPStatus = HTTPStatus.OK, length: int | None = None) -> None:
-        self.send_response(status)
-        for name, value in {"Content-Type": kind, **HEADERS, **({} if length is None else {"Content-Length": str(length)})}.items():
-            self.send_header(name, value)
-        self.end_headers()
+            self.answer(b"", "text/plain")
 
     def _follow(self, part: Any) -> None:
         """Stream a part per view, at most `MAX_RATE` a second, until the client disconnects; repeats the last one when idle."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +37,16 @@ def animation_figure(name: str, animation: Animation, mesh: Mesh | None = None, 
                      statuses: LimbStatuses | None = None, **more) -> Figure:
     """Figure of a moving skeleton with a mesh, by default a stick along every bone. `more`: fields of `Figure`."""
     places, turns = animation.world()
-    doubtful = None if statuses is None else limb_doubt(animation.names, statuses)
-    return Figure(name, animation.times, mesh or bone_mesh(animation), animation.rest, places, turns, kind, doubtful=doubtful, **more)
+    more = {"joints": places, "joint_names": animation.names} | more
+    return Figure(name, animation.times, mesh or bone_mesh(animation), animation.rest, places, turns, kind,
+                  **_of_statuses(animation.names, statuses), **more)
+
+
+def _of_statuses(names: Sequence[str], statuses: LimbStatuses | None) -> dict[str, Any]:
+    """Fields of a figure with joints of these names."""
+    if statuses is None:
+        return {}
+    return {"doubtful": limb_doubt(names, statuses), "limbs": tuple(statuses.limbs), "limb_status": statuses.status}
 
 
 def limb_doubt(names: Sequence[str], statuses: LimbStatuses) -> LimbDoubt:
@@ -63,6 +71,7 @@ def joint_figure(name: str, table: JointTable, kind: str = "estimate", **more) -
     places = table.positions
     ends = [(places[:, a], places[:, b], names[b]) for a, b in pairs]
     ends += [(places[:, n], places[:, n] + np.array([0, 0, DOT]), names[n]) for n in range(len(names)) if n not in used]
+    more = {"joints": places, "joint_names": tuple(names), "bones": tuple(pairs)} | more
     return _of_sticks(name, table.times, ends, kind, **more)
 
 
@@ -80,8 +89,7 @@ def _of_sticks(name: str, times: Array, ends: Sequence[tuple[Array, Array, str]]
     for n, (a, b, _) in enumerate(ends):
         places[:, n + 1], turns[:, n + 1] = a, _rotations_along(b - a)
         places[~np.isfinite(b).all(1), n + 1] = np.nan
-    doubtful = None if statuses is None else limb_doubt(frame.names, statuses)
-    return Figure(name, times, bone_mesh(frame), np.zeros((J, 3)), places, turns, kind, doubtful=doubtful, **more)
+    return Figure(name, times, bone_mesh(frame), np.zeros((J, 3)), places, turns, kind, **_of_statuses(frame.names, statuses), **more)
 
 
 def _rotations_along(along: Array) -> Array:

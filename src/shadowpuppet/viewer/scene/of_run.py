@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -32,8 +32,7 @@ from shadowpuppet.viewer.scene.scene import Chart, Figure, Scene, SceneCamera
 LIMBS = ("left_arm", "right_arm", "left_leg", "right_leg")
 OF_LIMBS = {"arm": ("shoulder", "elbow", "wrist", "arm", "forearm", "hand"), "leg": ("hip", "knee", "ankle", "leg")}
 """Words in the names of a limb's degrees of freedom."""
-UNSTATED = ("This run states no standard deviations. For “particles” and “uncertainty” its filter is run again on the frame that is shown, "
-            "from the pose before it; the ellipsoids tell how far those particles are spread, no measure of how far off the pose is.")
+UNSTATED = "This run states no standard deviations: no intervals are shown."
 
 
 def run_scene(folder: str | Path, truth: str | Path | None = None, recording: str | Path | None = None, *, films: bool = True) -> Scene:
@@ -92,7 +91,8 @@ class _Run:
         """Arguments of `animation_figure` for the estimate: statuses, overlap, joints and their standard deviations."""
         motion = self.run.motion
         return {"statuses": LimbStatuses(motion.limbs, motion.limb_status),
-                "status": motion.status, "overlap": motion.overlap, "joints": motion.joints, "joint_sd": motion.joint_sd}
+                "status": motion.status, "overlap": motion.overlap, "joints": motion.joints, "joint_names": motion.joint_names,
+                "joint_sd": motion.joint_sd}
 
     @cached_property
     def options(self) -> Options:
@@ -172,14 +172,17 @@ def fit_of(motion: Motion) -> Iterator[Chart]:
 
 
 def angles_of(motion: Motion) -> Iterator[Chart]:
-    """Charts of the degrees of freedom over time, degrees or metres: one each for limbs, trunk and head, and position."""
-    groups: dict[tuple[str, str], dict[str, Array]] = {}
-    for name, values in zip(motion.dof_names, motion.poses.T):
+    """Charts of the degrees of freedom and their standard deviations over time, degrees or metres: one each for limbs, trunk and head,
+    and position."""
+    groups: dict[tuple[str, str], dict[str, tuple[Array, Array]]] = {}
+    for name, values, sd in zip(motion.dof_names, motion.poses.T, motion.pose_sd.T):
         unit = "m" if dof_unit(name) == "m" else "°"
-        group = "place" if unit == "m" else _limb(name)
-        groups.setdefault((group, unit), {})[name.replace("_", " ")] = values if unit == "m" else np.degrees(values)
+        group, scale = ("place", 1.0) if unit == "m" else (_limb(name), np.degrees(1.0))
+        groups.setdefault((group, unit), {})[name.replace("_", " ")] = scale * values, scale * sd
     for (group, unit), curves in groups.items():
-        yield Chart(f"angles: {group}" if unit != "m" else group, unit, motion.times, curves)
+        stated = {name: sd for name, (_, sd) in curves.items() if np.isfinite(sd).any()}
+        yield Chart(f"angles: {group}" if unit != "m" else group, unit, motion.times, {name: each[0] for name, each in curves.items()},
+                    stated)
 
 
 def _limb(name: str) -> str:
@@ -209,11 +212,14 @@ def side_by_side(left: Scene, right: Scene, apart: float = 1.5) -> Scene:
 
 def _joined(one: Chart | None, other: Chart) -> Chart:
     """The curves of two charts, at the times of the first."""
-    named = {f"{name}, beside": values for name, values in other.curves.items()}
+    curves, sd = ({f"{name}, beside": values for name, values in each.items()} for each in (other.curves, other.sd))
     if one is None:
-        return replace(other, curves=named)
-    resampled = {name: np.interp(one.times, other.times, values, left=np.nan, right=np.nan) for name, values in named.items()}
-    return replace(one, curves={**one.curves, **resampled})
+        return replace(other, curves=curves, sd=sd)
+
+    def resampled(named: Mapping[str, Array]) -> dict[str, Array]:
+        return {name: np.interp(one.times, other.times, values, left=np.nan, right=np.nan) for name, values in named.items()}
+
+    return replace(one, curves={**one.curves, **resampled(curves)}, sd={**one.sd, **resampled(sd)})
 
 
 def _rightward(scene: Scene) -> Array:

@@ -20,12 +20,10 @@ from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate
 from shadowpuppet.tracking.resampling import normalise
-from shadowpuppet.viewer.scene.scene import Ellipsoids, ParticleCloud, SceneCamera
+from shadowpuppet.viewer.scene.scene import ParticleCloud, SceneCamera
 
 SEED = 0
 """Seed, so that the particles of a frame are the same every time."""
-SHORTEST_AXIS = 1e-4
-"""Shortest axis of an ellipsoid, metres."""
 
 
 class ParticleRerun:
@@ -85,13 +83,7 @@ class ParticleRerun:
     def _cloud(self, poses: Array, weights: Array) -> ParticleCloud:
         places = self.body.points(poses, self.root, self.names)
         lines = np.stack([places[:, [a for a, _ in self.bones]], places[:, [b for _, b in self.bones]]], 2)
-        share = weights / weights.sum()
-        middle = np.einsum("n,nkx->kx", share, places)
-        off = places - middle
-        variances, turns = np.linalg.eigh(np.einsum("n,nkx,nky->kxy", share, off, off))
-        mirrored = np.linalg.det(turns) < 0
-        turns[mirrored, :, 0] *= -1
-        return ParticleCloud(lines, weights, Ellipsoids(middle, np.maximum(np.sqrt(np.maximum(variances, 0)), SHORTEST_AXIS), turns))
+        return ParticleCloud(lines, weights)
 
     @cached_property
     def _tracker(self) -> MonocularTracker:

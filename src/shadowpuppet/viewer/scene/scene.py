@@ -23,17 +23,6 @@ VIEW_DIRECTION = (1.0, 1.6, 0.9)
 """Default direction of the first viewpoint: forward, to the side, up."""
 
 
-class Ellipsoids(NamedTuple):
-    """Uncertainty of points, as ellipsoids."""
-
-    points: Array
-    """World, metres, of shape (K, 3)."""
-    axes: Array
-    """Standard deviations along the axes of the ellipsoids, metres, of shape (K, 3)."""
-    turns: Array
-    """Rotations (K, 3, 3) from these axes to the world."""
-
-
 class LimbDoubt(NamedTuple):
     """Limbs of a figure that are not vouched for."""
 
@@ -54,8 +43,6 @@ class ParticleCloud(NamedTuple):
     """Bones of each particle, world, metres, of shape (N, B, 2, 3)."""
     weights: Array
     """Weights relative to the greatest, of shape (N,)."""
-    ellipsoids: Ellipsoids
-    """Spread of the joints."""
 
 
 class HullPoints(NamedTuple):
@@ -88,9 +75,17 @@ class Figure:
     overlap: Array | None = None
     """Overlap of the drawn body and the silhouettes, of shape (T,)."""
     joints: Array | None = None
-    """Joints with a stated uncertainty, of shape (T, K, 3), metres."""
+    """Named joints, of shape (T, K, 3), metres."""
+    joint_names: tuple[str, ...] = ()
+    """Their names."""
     joint_sd: Array | None = None
     """Their standard deviations along the world's axes, of shape (T, K, 3), metres."""
+    bones: tuple[tuple[int, int], ...] = ()
+    """Pairs of these joints with a line between them, where a figure is drawn as lines."""
+    limbs: tuple[str, ...] = ()
+    """Limbs, of `LIMBS`, with a status."""
+    limb_status: NDArray[np.str_] | None = None
+    """Their statuses, of shape (T, limbs), of `motion.STATUSES`."""
     doubtful: LimbDoubt | None = None
     """Which limbs are not vouched for; None: all are."""
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -129,15 +124,6 @@ class Figure:
             out[good] = np.roll(Rotation.from_matrix(flat[good]).as_quat(), 1, axis=1)
         return out.reshape(*self.turns.shape[:2], 4).astype(np.float32)
 
-    def uncertainty(self, n: int) -> Ellipsoids | None:
-        """Stated uncertainty of the joints in a frame; None if none is stated."""
-        if self.joints is None or self.joint_sd is None:
-            return None
-        good = np.isfinite(self.joint_sd[n]).all(1) & np.isfinite(self.joints[n]).all(1)
-        if not good.any():
-            return None
-        return Ellipsoids(self.joints[n, good], self.joint_sd[n, good], np.tile(np.eye(3), (int(good.sum()), 1, 1)))
-
 
 class CameraImages(Protocol):
     """Pictures and silhouettes of a camera, read on demand."""
@@ -170,6 +156,8 @@ class Chart:
     """Seconds, of shape (T,)."""
     curves: Mapping[str, Array]
     """Values (T,) by name; NaN where unknown."""
+    sd: Mapping[str, Array] = field(default_factory=dict)
+    """Standard deviations (T,) of some curves, by name; NaN where none is stated."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -194,11 +182,6 @@ class Scene:
     """Remarks for the user, a sentence each."""
     problems: tuple[str, ...] = ()
     """What could not be shown and why, a sentence each."""
-
-    @property
-    def has_uncertainty(self) -> bool:
-        """Whether any figure states an uncertainty."""
-        return any(figure.joint_sd is not None and bool(np.isfinite(figure.joint_sd).any()) for figure in self.figures)
 
     @cached_property
     def box(self) -> tuple[Array, Array]:

@@ -1,8 +1,6 @@
-"""Images shown in a camera's frustum: undistorted pictures and silhouettes."""
+"""Images of a camera as the viewer shows them: undistorted pictures and silhouettes."""
 
 from __future__ import annotations
-
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,44 +11,24 @@ from shadowpuppet.viewer.scene.scene import CameraImages
 
 WIDEST = 1.9
 """Tangent of half the greatest field of view; fisheye pictures are cut there."""
-PERSON, OUTLINE = (46, 92, 138), (255, 200, 60)
-"""Colours of a silhouette, and of its outline over a picture, RGB."""
-VEIL = 40
-"""Opacity of the background of a silhouette, of 255."""
+OUTLINE = (60, 200, 255)
+"""Colour of a silhouette's outline over a picture, blue green red."""
 
 
-class PictureMode(Enum):
-    """What frustums show."""
-
-    PICTURE = "pictures"
-    """The picture, with the silhouette's outline."""
-    SILHOUETTE = "silhouettes"
-    """The silhouette alone: no face, nothing of the room."""
-    NOTHING = "nothing"
-
-
-def frustum_image(images: CameraImages, undistort: Undistorter, time: float, mode: PictureMode) -> NDArray[np.uint8] | None:
-    """Image of a frustum at a time (s): RGB (H, W, 3), or RGBA (H, W, 4); None if there is none."""
+def camera_image(images: CameraImages, undistort: Undistorter, time: float, pictures: bool) -> NDArray[np.uint8] | None:
+    """A camera's undistorted image at a time (s): the picture with the silhouette's outline, (H, W, 3), blue green red; or the silhouette
+    alone, (H, W), white on black. None if there is none."""
     import cv2
 
-    if mode is PictureMode.NOTHING:
-        return None
     mask = images.mask(time)
-    outline = None if mask is None else undistort(mask.astype(np.uint8) * 255)
-    if mode is PictureMode.SILHOUETTE:
-        if outline is None:
-            return None
-        out = np.empty((*outline.shape, 4), np.uint8)
-        out[..., :3], out[..., 3] = PERSON, np.maximum(outline, VEIL)
-        return out
-    image = images.picture(time)
-    if image is None:
-        return None
-    out = np.ascontiguousarray(undistort(image)[..., ::-1])
-    if outline is None:
-        return out
-    lines = cv2.findContours((outline > 127).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
-    cv2.drawContours(out, lines, -1, OUTLINE, 1, cv2.LINE_AA)
+    silhouette = None if mask is None else np.where(undistort(mask.astype(np.uint8) * 255) > 127, 255, 0).astype(np.uint8)
+    image = images.picture(time) if pictures else None
+    if not pictures or image is None:
+        return None if pictures else silhouette
+    out = np.ascontiguousarray(undistort(image))
+    if silhouette is not None:
+        lines = cv2.findContours(silhouette, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
+        cv2.drawContours(out, lines, -1, OUTLINE, 1, cv2.LINE_AA)
     return out
 
 

@@ -20,7 +20,7 @@ from shadowpuppet.motion.mesh import body_mesh
 from shadowpuppet.viewer.scene.figures import LimbStatuses, animation_figure
 from shadowpuppet.viewer.scene.scene import Figure, Scene, SceneCamera
 from shadowpuppet.viewer.web.frustum_images import Undistorter
-from shadowpuppet.viewer.web.scene_view import SceneView, ViewOptions
+from shadowpuppet.viewer.web.scene_view import SceneView
 from shadowpuppet.viewer.web.server import address_of, close_server, open_server
 
 MOST_A_SECOND = 10.0
@@ -118,7 +118,7 @@ class _LiveScene:
         self.figure = posed(picture.body, self.tree, self.mesh, rest[0], self.root, every)
         server.scene.reset()
         show = Scene(title="live", times=np.zeros(1), figures=(self.figure,), cameras=(SceneCamera(picture.camera),))
-        self.stage = SceneView(server, show, ViewOptions(), width=WIDE)
+        self.stage = SceneView(server, show, WIDE)
         for client in server.get_clients().values():  # pages that are already open
             client.camera.position, client.camera.look_at = show.viewpoint, show.middle
         self.plain = Undistorter(picture.camera, WIDE)

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-import html
+import base64
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.pipeline.progress import Listener
-from shadowpuppet.viewer.scene.scene import Scene
-from shadowpuppet.viewer.web.frustum_images import PictureMode
-from shadowpuppet.viewer.web.scene_view import SceneView, ViewOptions
-from shadowpuppet.viewer.web.server import POLICY, close_server, open_server
-
-if TYPE_CHECKING:
-    import viser
+from shadowpuppet.threads import usable_cores
+from shadowpuppet.viewer.scene.scene import CameraImages, Scene
+from shadowpuppet.viewer.web.content import page_text
+from shadowpuppet.viewer.web.frustum_images import Undistorter, camera_image
 
 MAX_RATE = 30.0
 """Highest frame rate of a file, frames/s."""
-POINTS, WIDTH = 700, 200
-"""Hull points a frame, and width of images in pixels: small, as every frame is in the file."""
-HEAD = "<head>"
+WIDTH = 240
+"""Width of a file's images in pixels: small, as every frame is in the file."""
+QUALITY = 75
+"""Of JPEG, percent."""
 
 
 def check_page(path: Path) -> None:
@@ -35,47 +35,42 @@ def check_page(path: Path) -> None:
         raise ShadowPuppetError(f"{path}: cannot be written (there is no folder {path.parent})")
 
 
-def write_page(path: str | Path, scene: Scene, options: ViewOptions | None = None, listener: Listener | None = None) -> Path:
-    """Write a scene as one file, with pictures of people only if `options.pictures` says so, else silhouettes.
-
-    It has no curves, and no controls but the timeline's. Raises `ShadowPuppetError` if it cannot be written, or without viser.
-    """
-    path = Path(path)
+def write_page(path: str | Path, scene: Scene, pictures: bool = False, listener: Listener | None = None) -> Path:
+    """Write a scene as one file, with pictures of people only if `pictures`, else silhouettes. Raises `ShadowPuppetError` if it cannot be
+    written."""
+    path, listener = Path(path), listener or Listener()
     check_page(path)
-    server = open_server(port=0)
-    try:
-        text = _recorded(server, scene, options or ViewOptions(pictures=PictureMode.SILHOUETTE), listener or Listener())
-    finally:
-        close_server(server)
-    write_whole(path, sealed_page(text, scene.title))
+    frames, lenses = kept_frames(scene.times), [Undistorter(each.camera, WIDTH) for each in scene.cameras]
+    listener.begin("writing", len(frames))
+    images: list[list[str]] = [[] for _ in lenses]
+    with ThreadPoolExecutor(usable_cores(), "images") as pool:  # a camera's images are for one thread at a time
+        for n, frame in enumerate(frames.tolist()):
+            time = float(scene.times[frame])
+            made = pool.map(lambda each, lens, time=time: _url(each.images, lens, time, pictures), scene.cameras, lenses)
+            for kept, url in zip(images, made):
+                kept.append(url)
+            listener.advance(n + 1)
+    write_whole(path, page_text(scene, lenses, images, pictures, frames))
     return path
 
 
-def sealed_page(page: str, title: str) -> str:
-    """A page with its title and a policy that forbids the browser to fetch anything."""
-    head = page.index(HEAD) + len(HEAD)
-    kept = page[:head] + f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">' + page[head:]
-    return kept.replace("<title>Viser</title>", f"<title>{html.escape(title)}</title>", 1)
-
-
-def kept_frames(times: Array) -> Array:
-    """Times of the frames in a file: all, or every Nth for at most `MAX_RATE`."""
+def kept_frames(times: Array) -> NDArray[np.int64]:
+    """Indices of the frames in a file: all, or every Nth for at most `MAX_RATE`."""
     if len(times) < 2:
-        return times
+        return np.arange(len(times))
     every = max(int(np.ceil(1 / (MAX_RATE * float(np.median(np.diff(times)))) - 1e-6)), 1)
-    return times[::every]
+    return np.arange(0, len(times), every)
 
 
-def _recorded(server: viser.ViserServer, scene: Scene, options: ViewOptions, listener: Listener) -> str:
-    view, times = SceneView(server, scene, options, width=WIDTH, points=POINTS), kept_frames(scene.times)
-    view.to(float(times[0]))
-    serializer = server.get_scene_serializer()
-    listener.begin("writing", len(times))
-    for n, now in enumerate(times):
-        view.to(float(now))
-        if n + 1 < len(times):
-            serializer.insert_sleep(float(times[n + 1] - now))
-        listener.advance(n + 1)
-    if len(times) > 1:
-        serializer.insert_sleep(float(np.median(np.diff(times))))
-    return serializer.as_html()
+def _url(images: CameraImages | None, lens: Undistorter, time: float, pictures: bool) -> str:
+    found = None if images is None else encoded_image(images, lens, time, pictures)
+    return "" if found is None else f"data:{found[1]};base64,{base64.b64encode(found[0]).decode()}"
+
+
+def encoded_image(images: CameraImages, lens: Undistorter, time: float, pictures: bool) -> tuple[bytes, str] | None:
+    """A camera's undistorted image at a time (s), and its content type; None if there is none."""
+    image = camera_image(images, lens, time, pictures)
+    if image is None:
+        return None
+    how = [cv2.IMWRITE_JPEG_QUALITY, QUALITY] if pictures else [cv2.IMWRITE_PNG_BILEVEL, 1, cv2.IMWRITE_PNG_COMPRESSION, 9]
+    return cv2.imencode(".jpg" if pictures else ".png", image, how)[1].tobytes(), "image/jpeg" if pictures else "image/png"

@@ -1,4 +1,4 @@
-"""Serves the page of a scene."""
+"""Serves the page of a scene to this machine's browser: images, hull points and particles are made when the page asks for them."""
 
 from __future__ import annotations
 
@@ -6,55 +6,149 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cached_property
+from http import HTTPStatus
 
+import numpy as np
+
+from shadowpuppet.errors import ShadowPuppetError, warn
+from shadowpuppet.geometry import Array
+from shadowpuppet.network import is_loopback, is_same_origin, open_page, page_headers, shown_host
+from shadowpuppet.page_server import PageHandler, PageServer
 from shadowpuppet.viewer.scene.scene import Scene
-from shadowpuppet.viewer.web.frustum_images import PictureMode
-from shadowpuppet.viewer.web.panel import Panel
-from shadowpuppet.viewer.web.scene_view import SceneView, ViewOptions
-from shadowpuppet.viewer.web.server import address_of, close_server, open_server
+from shadowpuppet.viewer.web.content import page_text
+from shadowpuppet.viewer.web.frustum_images import Undistorter
+from shadowpuppet.viewer.web.page import encoded_image
+
+PORT = 8610
+"""Port tried first if none is given."""
+WIDTH = 640
+"""Width of images, pixels."""
+POINTS, PARTICLES = 2400, 150
+"""Greatest numbers of hull points and of particles that are shown: those of greatest weight."""
 
 
-def serve_scene(scene: Scene, listen: str = "127.0.0.1", port: int | None = None, options: ViewOptions | None = None,
-         ready: Callable[[str], None] = lambda address: None, done: Callable[[], bool] = lambda: False) -> None:
-    """Serve a scene's page until `done` returns True, or Ctrl-C. `ready` is called with its address.
+class ScenePage:
+    """What the page of a scene asks for. Thread-safe."""
 
-    Raises `SettingsError` if the address or port is not free, `ShadowPuppetError` without viser.
-    """
-    server = open_server(listen, port)
-    try:
-        view = SceneView(server, scene, options or default_view(scene))
-        view.people(view.time)
-        panel = Panel(server, view, time.monotonic)
-        ready(address_of(server))
-        panel.follow(done)
-    finally:
-        close_server(server)
+    def __init__(self, scene: Scene) -> None:
+        """Reads no film before it is asked for."""
+        self.scene, self.lenses = scene, [Undistorter(each.camera, WIDTH) for each in scene.cameras]
+        self._reading = threading.Lock()
+
+    @cached_property
+    def text(self) -> bytes:
+        """The page."""
+        return page_text(self.scene, self.lenses, None, pictures=True).encode()
+
+    def part(self, path: str) -> tuple[bytes, str] | None:
+        """What is at a path of the server, and its content type; None if it knows no such path. Empty if there is nothing to show:
+
+        /image/CAMERA/FRAME/pictures|silhouettes, /hull/FRAME, /particles/FRAME; the latter two are numbers of 32 bits, little-endian.
+        """
+        kind, *rest = path.strip("/").split("/")
+        frame = _number(rest[1] if kind == "image" and len(rest) == 3 else rest[-1] if rest else "", len(self.scene.times))
+        if path == "/":
+            return self.text, "text/html; charset=utf-8"
+        if frame is None:
+            return None
+        now = float(self.scene.times[frame])
+        with self._reading:  # films, backgrounds and hulls are for one thread at a time
+            if kind == "image" and len(rest) == 3 and rest[2] in ("pictures", "silhouettes"):
+                return self._image(rest[0], now, rest[2] == "pictures")
+            if kind == "hull" and self.scene.hull is not None:
+                return _bytes(self._hull(now))
+            if kind == "particles" and self.scene.cloud is not None:
+                return _bytes(self._particles(now))
+        return None
+
+    def _image(self, camera: str, now: float, pictures: bool) -> tuple[bytes, str] | None:
+        n = _number(camera, len(self.lenses))
+        images = None if n is None else self.scene.cameras[n].images
+        if n is None or images is None:
+            return None
+        return encoded_image(images, self.lenses[n], now, pictures) or (b"", "image/png")
+
+    def _hull(self, now: float) -> Array:
+        """Points and the number of their camera, (P, 4)."""
+        assert self.scene.hull is not None
+        found = self.scene.hull(now)
+        order = np.unique(np.linspace(0, len(found.points) - 1, min(POINTS, len(found.points))).round().astype(int))
+        return np.column_stack([found.points[order], found.cameras[order].astype(float)])
+
+    def _particles(self, now: float) -> Array:
+        """Ends of the bones of the particles, least weight first, and the weight, (N B, 7)."""
+        assert self.scene.cloud is not None
+        cloud = self.scene.cloud(now)
+        if cloud is None:
+            return np.zeros((0, 7))
+        order = np.argsort(-cloud.weights, kind="stable")[:PARTICLES][::-1]
+        lines = cloud.lines[order]
+        weights = np.repeat(cloud.weights[order], lines.shape[1])
+        return np.column_stack([lines.reshape(-1, 6), weights])
+
+
+def _number(text: str, count: int) -> int | None:
+    """A number below `count`, in decimal digits; None if it is none."""
+    return int(text) if text.isascii() and text.isdecimal() and len(text) < 10 and int(text) < count else None
+
+
+def _bytes(values: Array) -> tuple[bytes, str]:
+    return np.ascontiguousarray(values, "<f4").tobytes(), "application/octet-stream"
+
+
+class _Server(PageServer):
+    def __init__(self, page: ScenePage, listen: str, port: int) -> None:
+        self.page = page
+        super().__init__(_Handler, listen, port)
+
+
+class _Handler(PageHandler):
+    server: _Server  # pyright: ignore[reportIncompatibleVariableOverride]
+    page_headers = page_headers("base-uri 'none'")  # the page has its own policy inside
+
+    def do_GET(self) -> None:
+        """Answer with the page, an image, or numbers."""
+        if not self.is_accepted():
+            return
+        if not is_same_origin(self.headers):
+            self.refuse(HTTPStatus.FORBIDDEN, "this page is served to itself only")
+            return
+        try:
+            found = self.server.page.part(self.path)
+        except ShadowPuppetError as error:
+            self.refuse(HTTPStatus.INTERNAL_SERVER_ERROR, str(error))
+            return
+        if found is None:
+            self.refuse(HTTPStatus.NOT_FOUND, "no such page")
+        elif not found[0]:
+            self.begin("text/plain", HTTPStatus.NO_CONTENT, 0)
+        else:
+            self.answer(*found)
 
 
 @contextmanager
-def serving(scene: Scene, options: ViewOptions, **more: int) -> Iterator[tuple[str, Panel]]:
-    """Serve a scene from a thread; yields the page's address and its controls.
-
-    `more`: arguments of `SceneView`. Raises the errors of `serve_scene`.
-    """
-    server = open_server(port=0)
-    panel = Panel(server, SceneView(server, scene, options, **more))
-    thread = threading.Thread(target=panel.follow)
+def serving(scene: Scene, listen: str = "127.0.0.1", port: int | None = None) -> Iterator[str]:
+    """Serve a scene's page; yields its address. Raises `SettingsError` if the address or port is not free. Warns if other machines can
+    reach it."""
+    page = ScenePage(scene)
+    server = open_page(lambda tried: _Server(page, listen, tried), listen, port, PORT)
+    if not is_loopback(listen):
+        warn(f"the page is served at {listen}: everybody who reaches this machine can see what it shows")
+    thread = threading.Thread(target=server.serve_forever, name="page", daemon=True)
     thread.start()
     try:
-        yield address_of(server), panel
+        yield f"http://{shown_host(listen)}:{server.server_port}/"
     finally:
-        panel.stop()
+        server.shutdown()
+        server.server_close()
         thread.join()
-        panel.view.close()
-        close_server(server)
 
 
-def default_view(scene: Scene, pictures: bool = True) -> ViewOptions:
-    """The first view of a scene: bodies transparent if a truth is inside them, hull points if there is no puppet, the pictures of films
-    (or their silhouettes alone)."""
-    kinds = {figure.kind for figure in scene.figures}
-    mode = PictureMode.PICTURE if pictures else PictureMode.SILHOUETTE
-    transparent = {"estimate", "truth"} <= kinds
-    return ViewOptions(transparent=transparent, hull=scene.hull is not None and "estimate" not in kinds, pictures=mode,
-                       uncertainty=scene.has_uncertainty)
+def serve_scene(scene: Scene, listen: str = "127.0.0.1", port: int | None = None,
+                ready: Callable[[str], None] = lambda address: None) -> None:
+    """Serve a scene's page until Ctrl-C. `ready` is called with its address. Raises `SettingsError` if the address or port is not free."""
+    with serving(scene, listen, port) as address:
+        ready(address)
+        while True:
+            time.sleep(3600)

@@ -48,7 +48,7 @@ def check_viser() -> None:
     import importlib.util
 
     if importlib.util.find_spec("viser") is None:
-        raise ShadowPuppetError("the viewer needs viser: pip install 'shadowpuppet[view]'")
+        raise ShadowPuppetError("--show viewer needs viser: pip install 'shadowpuppet[view]'")
 
 
 def open_server(listen: str = "127.0.0.1", port: int | None = None) -> viser.ViserServer:

@@ -1,0 +1,1 @@
+"""Skeletons as characters of animation programs: their bones' names, and USD."""

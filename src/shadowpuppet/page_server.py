@@ -1,0 +1,101 @@
+"""An HTTP server for a page on this machine: few connections, slow requests ended, other host names refused."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+from collections.abc import Mapping
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+from shadowpuppet.network import MAX_CONNECTIONS, REQUEST_SECONDS, address_family, is_loopback, is_own_host
+
+
+class PageServer(ThreadingHTTPServer):
+    """Answers each connection in a thread of its own, `MAX_CONNECTIONS` at a time."""
+
+    daemon_threads = True
+    allow_reuse_address = False
+
+    def __init__(self, handler: type[PageHandler], listen: str, port: int) -> None:
+        """Listen at an address and port (0: any). Raises `OSError` if these are not available."""
+        self._free = threading.Semaphore(MAX_CONNECTIONS)
+        self.loopback, self.address_family = is_loopback(listen), address_family(listen)
+        super().__init__((listen, port), handler)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer in a thread of its own, or close the connection if there are `MAX_CONNECTIONS` already."""
+        if self._free.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Answer, in the thread."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Ignore connections that a browser closed."""
+
+
+class PageHandler(BaseHTTPRequestHandler):
+    """Answers requests; subclasses have `do_GET` and `page_headers`."""
+
+    server: PageServer  # pyright: ignore[reportIncompatibleVariableOverride]
+    server_version, sys_version = "shadowpuppet", ""
+    timeout = 30
+    page_headers: Mapping[str, str] = {}
+    """Headers of every answer."""
+
+    def handle_one_request(self) -> None:
+        """Answer one request; the connection is closed if it has not come within `REQUEST_SECONDS`, however slowly it comes."""
+        self._ending = threading.Timer(REQUEST_SECONDS, self._end)
+        self._ending.daemon = True
+        self._ending.start()
+        try:
+            super().handle_one_request()
+        finally:
+            self._ending.cancel()
+
+    def parse_request(self) -> bool:
+        """Read the request's headers."""
+        try:
+            return super().parse_request()
+        finally:
+            self._ending.cancel()
+
+    def _end(self) -> None:
+        with contextlib.suppress(OSError):
+            self.connection.shutdown(socket.SHUT_RDWR)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Log nothing."""
+
+    def is_accepted(self) -> bool:
+        """Whether the request names this machine as its host; else it is refused."""
+        if is_own_host(self.headers, self.server.loopback):
+            return True
+        self.refuse(HTTPStatus.MISDIRECTED_REQUEST, "this page is served under the machine's own address only")
+        return False
+
+    def answer(self, body: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
+        """Send a whole answer of a content type."""
+        self.begin(kind, status, len(body))
+        self.wfile.write(body)
+
+    def refuse(self, status: HTTPStatus, why: str) -> None:
+        """Send a status and a line that says why."""
+        self.answer(f"{why}\n".encode(), "text/plain; charset=utf-8", status)
+
+    def begin(self, kind: str, status: HTTPStatus = HTTPStatus.OK, length: int | None = None) -> None:
+        """Send the status and headers."""
+        self.send_response(status)
+        sizes = {} if length is None else {"Content-Length": str(length)}
+        for name, value in {"Content-Type": kind, **self.page_headers, **sizes}.items():
+            self.send_header(name, value)
+        self.end_headers()

@@ -1,0 +1,134 @@
+"""The viewer's page as text: its template, and a scene as numbers that the page draws. It fetches nothing from elsewhere."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shadowpuppet.geometry import Array, inverse
+from shadowpuppet.io.intervals import HALF_WIDTH
+from shadowpuppet.motion.motion import STATUSES
+from shadowpuppet.viewer.scene.colours import mesh_colours
+from shadowpuppet.viewer.scene.scene import Chart, Figure, Scene, SceneCamera
+from shadowpuppet.viewer.scene.strip import Strip, doubtful_moments, strips_of
+from shadowpuppet.viewer.web.frustum_images import Undistorter
+
+SCRIPTS = ("stage.js", "charts.js", "page.js")
+BY_CAMERA = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442")
+"""Colours of cameras (Okabe and Ito 2008) and of the hull points on their contours."""
+NOTHING = "'none'"
+
+
+def page_text(scene: Scene, cameras: Sequence[Undistorter], images: Sequence[Sequence[str]] | None, pictures: bool,
+              frames: NDArray[np.int64] | None = None) -> str:
+    """The page of a scene.
+
+    Args:
+        scene: what is shown.
+        cameras: for each camera, what its images are undistorted by.
+        images: data URLs of each camera's images by frame, empty where there is none; None if the page asks its server for them.
+        pictures: whether images are pictures, else silhouettes, at first.
+        frames: indices of the frames that the page has; None: all.
+    """
+    every = np.arange(len(scene.times)) if frames is None else frames
+    data = json.dumps(_content(scene, cameras, images, pictures, every), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    script, style = "\n".join(map(_file, SCRIPTS)), _file("page.css")
+    server = "'self'" if images is None else ""
+    policy = (f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; img-src data: {server}; "
+              f"connect-src {server or NOTHING}; base-uri 'none'; form-action 'none'")  # fmt: skip
+    out = _file("page.html")
+    for name, text in (("POLICY", policy), ("TITLE", html.escape(scene.title)), ("STYLE", style), ("DATA", data), ("SCRIPT", script)):
+        out = out.replace(f"@{name}@", text)
+    return out
+
+
+def _file(name: str) -> str:
+    return files("shadowpuppet.viewer.web").joinpath(name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
+
+
+def _content(scene: Scene, cameras: Sequence[Undistorter], images: Sequence[Sequence[str]] | None, pictures: bool,
+             frames: NDArray[np.int64]) -> dict[str, Any]:
+    times = scene.times[frames]
+    low, high = scene.box
+    return {
+        "title": scene.title, "times": packed(times, "f8"), "frames": packed(frames, "u4"), "statuses": STATUSES,
+        "box": [low.tolist(), high.tolist()], "floor": scene.floor, "direction": (scene.viewpoint - scene.middle).tolist(),
+        "figures": [_figure(figure, times) for figure in scene.figures],
+        "cameras": [_camera(each, lens, n) for n, (each, lens) in enumerate(zip(scene.cameras, cameras))],
+        "images": images, "pictures": pictures, "served": images is None,
+        "hull": images is None and scene.hull is not None, "particles": images is None and scene.cloud is not None,
+        "charts": [_chart(chart, times) for chart in scene.charts],
+        "strips": [_strip(strip, frames) for strip in strips_of(scene)],
+        "moments": np.searchsorted(frames, doubtful_moments(scene)).clip(max=len(frames) - 1).tolist(),
+        "labels": [{"text": text, "at": place} for text, place in scene.labels],
+        "facts": dict(scene.facts), "notes": scene.notes, "problems": scene.problems, "interval": HALF_WIDTH,
+    }  # fmt: skip
+
+
+def _figure(figure: Figure, times: Array) -> dict[str, Any]:
+    """A figure at the page's frames: its mesh, and where its joints are in each of its own frames that is shown."""
+    shown = np.array([-1 if (n := figure.at(float(time))) is None else n for time in times])
+    used, index = np.unique(shown[shown >= 0], return_inverse=True)
+    at = np.full(len(times), -1)
+    at[shown >= 0] = index.ravel()
+    mesh = figure.mesh
+    found = {
+        "name": figure.name, "kind": figure.kind, "shift": figure.shift, "frames": packed(at, "i4"), "count": len(used),
+        "joints": figure.places.shape[1], "turns": packed(32767 * np.roll(figure.quaternions[used], -1, axis=2), "i2"),
+        "places": packed(figure.places[used], "f4"), "jointNames": [name.replace("_", " ") for name in figure.joint_names],
+        "named": None if figure.joints is None else packed(figure.joints[used], "f4"), "bones": figure.bones,
+        "sd": None if figure.joint_sd is None or not np.isfinite(figure.joint_sd).any() else packed(figure.joint_sd[used], "f4"),
+        "doubtful": None if figure.doubtful is None else packed(figure.doubtful.frames[used], "u1"),
+        "limbs": 0 if figure.doubtful is None else figure.doubtful.frames.shape[1],
+    }  # fmt: skip
+    if figure.kind == "truth" and figure.joints is not None and figure.bones:
+        return found  # lines
+    limbs = np.zeros(len(mesh.joints)) if figure.doubtful is None else figure.doubtful.limbs[mesh.joints]
+    return found | {"mesh": {
+        "points": packed(mesh.points - figure.rest[mesh.joints], "f4"), "normals": packed(mesh.normals, "f4"),
+        "triangles": packed(mesh.triangles, "u4"), "colours": packed(mesh_colours(figure), "u1"),
+        "joints": packed(mesh.joints, "f4"), "limbs": packed(limbs, "f4")}}  # fmt: skip
+
+
+def _camera(each: SceneCamera, lens: Undistorter, n: int) -> dict[str, Any]:
+    T = inverse(each.camera.T_camera_world)
+    return {"name": each.camera.name, "pose": T.tolist(), "tan": [lens.aspect * np.tan(lens.fov / 2), np.tan(lens.fov / 2)],
+            "colour": BY_CAMERA[n % len(BY_CAMERA)], "images": each.images is not None, "width": lens.size[0], "height": lens.size[1]}
+
+
+def _chart(chart: Chart, times: Array) -> dict[str, Any]:
+    kept = (chart.times >= times[0] - 1e-6) & (chart.times <= times[-1] + 1e-6)
+    return {"name": chart.name, "unit": chart.unit, "times": packed(chart.times[kept], "f8"), "curves": _packed(chart.curves, kept),
+            "sd": _packed(chart.sd, kept)}
+
+
+def _packed(curves: Mapping[str, Array], kept: NDArray[np.bool_]) -> dict[str, Any]:
+    return {name: packed(values[kept], "f4") for name, values in curves.items()}
+
+
+def _strip(strip: Strip, frames: NDArray[np.int64]) -> dict[str, Any]:
+    rows = {"widest 90 % interval": ("interval", strip.width, "mm"), "overlap": ("overlap", strip.overlap, "of 1"),
+            "error": ("error", strip.error, "mm")}  # fmt: skip
+    return {"name": strip.name, "limbs": strip.limbs, "status": packed(strip.status[frames], "i1"),
+            "rows": [{"name": name, "short": short, "unit": unit, "values": packed(values[frames], "f4")}
+                     for name, (short, values, unit) in rows.items() if np.isfinite(values).any()]}  # fmt: skip
+
+
+def packed(values: ArrayLike, kind: str) -> dict[str, str]:
+    """An array as its type and its bytes in base 64, little-endian, for `unpack` in stage.js."""
+    array = np.asarray(values)
+    if kind[0] in "iu" and array.dtype.kind == "f":
+        array = np.nan_to_num(array).round()
+    return {"type": kind, "data": base64.b64encode(np.ascontiguousarray(array, f"<{kind}").tobytes()).decode()}
