@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from av import Packet, VideoFrame
 
 MAX_DECODED = 1.0
-"""Largest step ahead, seconds, for which frames are decoded one by one; for larger steps the container's index is used."""
+"""Largest step ahead, seconds, for which frames are decoded on in any case; for larger steps from a key frame if one comes before."""
 NEEDED = 4
 """Frame intervals before the wanted time from which on every frame is decoded; of those before only what others refer to."""
 
@@ -127,7 +127,8 @@ class _Film:
     def at(self, time: float) -> Image | None:
         self.wanted = wanted = time * self.scale
         reached = self.waiting or self.held
-        if reached is None or wanted > reached.time + MAX_DECODED or (self.held is not None and wanted < self.held.time - self.step / 4):
+        back = self.held is not None and wanted < self.held.time - self.step / 4
+        if reached is None or back or (wanted > reached.time + MAX_DECODED and self._key_frame_between(reached.time, wanted)):
             self._seek(wanted)
         while self.waiting is not None and self.waiting.time <= wanted:
             self._advance()
@@ -137,6 +138,14 @@ class _Film:
     def _advance(self) -> None:
         """Decode one more frame: `held` is the present frame, `waiting` the next."""
         self.held, self.waiting = self.waiting, next(self.frames, None)
+
+    def _key_frame_between(self, reached: float, wanted: float) -> bool:
+        """Whether a key frame may lie between two times: if the last one before the later is not before both, or not in the index."""
+        base, entries = self.stream.time_base, self.stream.index_entries
+        if self.zero is None or base is None:
+            return True
+        key = entries.search_timestamp(self.zero + int(wanted / base))
+        return not 0 <= key < len(entries) - 1 or entries[key].timestamp > self.zero + reached / base
 
     def _seek(self, wanted: float) -> None:
         """Go to the last key frame before a time, or to the start if the film has no index."""
