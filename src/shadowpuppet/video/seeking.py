@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from av import Packet, VideoFrame
 
 MAX_DECODED = 1.0
-"""Largest step ahead, seconds, for which frames are decoded on in any case; for larger steps from a key frame if one comes before."""
+"""Largest step ahead, seconds, for which frames are decoded on if the container's index does not tell whether a key frame comes between."""
 NEEDED = 4
-"""Frame intervals before the wanted time from which on every frame is decoded; of those before only what others refer to."""
+"""Frame intervals before the wanted time from which on every frame is decoded; of those before at most what others refer to."""
 
 
 class Seeker:
@@ -128,7 +128,7 @@ class _Film:
         self.wanted = wanted = time * self.scale
         reached = self.waiting or self.held
         back = self.held is not None and wanted < self.held.time - self.step / 4
-        if reached is None or back or (wanted > reached.time + MAX_DECODED and self._key_frame_between(reached.time, wanted)):
+        if reached is None or back or self._may_jump(reached.time, wanted):
             self._seek(wanted)
         while self.waiting is not None and self.waiting.time <= wanted:
             self._advance()
@@ -139,13 +139,16 @@ class _Film:
         """Decode one more frame: `held` is the present frame, `waiting` the next."""
         self.held, self.waiting = self.waiting, next(self.frames, None)
 
-    def _key_frame_between(self, reached: float, wanted: float) -> bool:
-        """Whether a key frame may lie between two times: if the last one before the later is not before both, or not in the index."""
+    def _may_jump(self, reached: float, wanted: float) -> bool:
+        """Whether a key frame lies between two times; if the index does not tell, whether they are far apart."""
         base, entries = self.stream.time_base, self.stream.index_entries
-        if self.zero is None or base is None:
-            return True
-        key = entries.search_timestamp(self.zero + int(wanted / base))
-        return not 0 <= key < len(entries) - 1 or entries[key].timestamp > self.zero + reached / base
+        if wanted <= reached + NEEDED * self.step:
+            return False
+        if self.zero is not None and base is not None:
+            key = entries.search_timestamp(self.zero + int(wanted / base))
+            if 0 <= key < len(entries) - 1:  # a last one may be that of what was read so far
+                return entries[key].timestamp > self.zero + reached / base
+        return wanted > reached + MAX_DECODED
 
     def _seek(self, wanted: float) -> None:
         """Go to the last key frame before a time, or to the start if the film has no index."""
