@@ -243,7 +243,8 @@ def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration
         return read_calibration(calibration, sizes=size, **told)
     if len(films) > 1:
         raise RecordingError(f"{folder}: no calibration.toml for its {len(films)} cameras ({choices(films)}); several cameras must be "
-                             "calibrated together: by a board (`shadowpuppet calibrate LAB`), or by the person who walks there, from a "
+                             "calibrated together: by films of a printed board in another folder (`shadowpuppet calibrate BOARD_FOLDER`, "
+                             "docs/calibration.md), or by the person who walks there, from a "
                              f"rough.toml that says where they stand (`shadowpuppet calibrate {folder} --from-person`)")
     if fov is None:
         raise RecordingError(f"{folder}: no calibration: give the camera's horizontal field of view (--fov DEGREES, option fov; a "

@@ -75,7 +75,7 @@ class _Reader:
     def times(self) -> Iterator[int]:
         """Times (pts) of all frames, in order: one is certain once a packet is decoded later than it is shown."""
         self._read()
-        last = self.held[0].pts - 1 if self.held else 0  # a first frame that is no key frame, and cannot be decoded, comes before it
+        last = _time(self.held[0]) - 1 if self.held else 0  # a first frame that is no key frame, and cannot be decoded, comes before it
         while True:
             while not self.ended and not (self.coming and self.last_dts is not None and self.coming[0] <= self.last_dts):
                 self._read()
@@ -127,14 +127,14 @@ class _Reader:
     def _leave_out(self, pts: int) -> None:
         """Leave out what no frame from `pts` on needs: frames before it, and packets before its key frame."""
         key = None
-        while self.keys and self.keys[0].pts <= pts:
+        while self.keys and _time(self.keys[0]) <= pts:
             key = self.keys.popleft()
         if key is not None and key is not self.held[0]:
             self.codec.flush_buffers()
             self.frames.clear()
             while self.held[0] is not key:
                 self.held.popleft()
-        while self.frames and self.frames[0].pts < pts:
+        while self.frames and _time(self.frames[0]) < pts:
             self.frames.popleft()
         while len(self.held) > HELD:
             self._decode(pts)
@@ -144,11 +144,18 @@ class _Reader:
         packet = self.held.popleft()
         if self.keys and self.keys[0] is packet:
             self.keys.popleft()
-        self.codec.skip_frame = "NONREF" if packet.pts < pts else "DEFAULT"
+        self.codec.skip_frame = "NONREF" if _time(packet) < pts else "DEFAULT"
         self._keep(packet.decode(), pts)
 
     def _keep(self, frames: list[VideoFrame], pts: int) -> None:
         """Keep decoded frames that are not before `pts`."""
-        if any(frame.is_corrupt or frame.pts is None for frame in frames):
+        if any(frame.is_corrupt for frame in frames):
             raise Irregular
-        self.frames.extend(frame for frame in frames if frame.pts >= pts)
+        self.frames.extend(frame for frame in frames if _time(frame) >= pts)
+
+
+def _time(shown: Packet | VideoFrame) -> int:
+    """The time (pts) of a packet's frame, or of a frame. Raises `Irregular` if it has none."""
+    if shown.pts is None:
+        raise Irregular
+    return shown.pts
