@@ -6,7 +6,7 @@ also refines.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +40,21 @@ Weigh = Callable[[Array], tuple[Array, Array]]
 def evaluate(poses: Array, weigh: Weigh) -> Particles:
     """Particles of poses (N, D), with their costs and weights."""
     return Particles(poses, *weigh(poses))
+
+
+def best_of(sets: Sequence[Particles], number: int) -> Particles:
+    """The `number` particles of least cost in some sets, best first; repeated if there are fewer."""
+    found = Particles(*(np.concatenate(values) for values in zip(*sets, strict=True)))
+    order = found.costs.argsort(kind="stable")[:number]
+    order = order[np.arange(number) % len(order)]
+    return Particles(*(values[order] for values in found))
+
+
+def better_of(first: Particles, second: Particles) -> Particles:
+    """Of each pair of N particles the one of less cost, the first where they cost the same."""
+    better = second.costs < first.costs
+    return Particles(np.where(better[:, None], second.poses, first.poses), np.where(better, second.costs, first.costs),
+                     np.where(better, second.log_weights, first.log_weights))
 
 
 def step(rng: np.random.Generator, particles: Particles, *, resample: Scheme, propose: Propose, weigh: Weigh,

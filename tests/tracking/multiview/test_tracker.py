@@ -116,7 +116,7 @@ def test_hybrid_keeps_what_image_forces_lose():
 @pytest.mark.parametrize("overrides", [
     {"particles": 1}, {"cycles": 3}, {"estimate": "mean"}, {"silhouettes": 0.0}, {"resampling": "stratified"},
     {"resampling": "multinomial"}, {"resampling": "residual"}, {"velocity": 1.0},
-    {"posture": 0.0}, {"explore": 1.0}, {"surface": {"epsilon": 0.3, "tau": 0.1}},
+    {"posture": 0.0}, {"explore": 1.0}, {"local": 0}, {"local": 1}, {"surface": {"epsilon": 0.3, "tau": 0.1}},
     {"gauss_newton": {"coarse": 0}}, {"gauss_newton": {"fine": 0, "share": 1}}, {"refinement": "forces", "forces": {"translation": 0.7}},
     {"refinement": "forces", "forces": {"robust": False, "modulated": False}}, {"hull": {"rays": 600}},
 ], ids=str)  # fmt: skip
@@ -127,6 +127,16 @@ def test_every_setting_runs(overrides):
     assert {state.status for state in states} <= {"tracked", "uncertain"}
     assert errors(of, states, poses[:4]).max() < 0.15
     assert states[-1].particles.poses.shape == (of.settings.particles, len(NAMES))
+
+
+def test_the_local_search_is_the_hybrid_filters_and_ends_at_less_cost():
+    _, seen = actor.filmed()
+    for method, less in (("hybrid", True), ("particle_filter", False)):
+        without, with_it = (np.array([s.cost for s in track(tracker(method=method, local=n), seen[:6])]) for n in (0, 12))
+        if less:
+            assert with_it[1:].mean() < without[1:].mean()
+        else:
+            np.testing.assert_array_equal(with_it, without)
 
 
 def test_without_the_sum_over_what_hangs_on_a_joint_tracking_runs_but_is_worse():

@@ -16,7 +16,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms, usual_postures
 from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
-from shadowpuppet.tracking.particle_filter import Particles, Weigh, evaluate
+from shadowpuppet.tracking.particle_filter import Particles, Weigh, best_of, evaluate
 
 HEADINGS = 16
 """Number of headings in which each posture is tried."""
@@ -48,27 +48,18 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
     poses = place_postures(body, postures, observation.full.origin)
     share, _, tau = COARSE_STAGES[0]
     poses = poses[refiner.costs(poses, observation.cloud(share), tau).argsort(kind="stable")[:COARSE_CANDIDATES]]
-    poses = _best(evaluate(_refined(refiner, observation, poses, COARSE_STAGES), weigh), FINE_CANDIDATES).poses
-    found = _best(evaluate(_refined(refiner, observation, poses, FINE_STAGES), weigh), number)
+    poses = best_of((evaluate(_refined(refiner, observation, poses, COARSE_STAGES), weigh),), FINE_CANDIDATES).poses
+    found = best_of((evaluate(_refined(refiner, observation, poses, FINE_STAGES), weigh),), number)
     for _, side in product(range(ARM_ROUNDS), ("left", "right")):
         tried = _other_arms(rng, body, found.best, side)
         tried = tried[refiner.costs(tried, observation.cloud(share), COARSE_STAGES[1][2]).argsort(kind="stable")[:FINE_CANDIDATES]]
-        others = evaluate(_refined(refiner, observation, tried, FINE_STAGES), weigh)
-        poses, costs, log_weights = (np.concatenate(pair) for pair in zip(found[:3], others[:3], strict=True))
-        found = _best(Particles(poses, costs, log_weights), number)
+        found = best_of((found, evaluate(_refined(refiner, observation, tried, FINE_STAGES), weigh)), number)
     return found
 
 
 def _refined(refiner: Refiner, observation: MultiviewObservation, poses: Array, stages: tuple) -> Array:
     clouds = tuple((observation.cloud(share), iterations, tau) for share, iterations, tau in stages)
     return refiner.gauss_newton(poses, clouds, poses, np.full(poses.shape[1], PULL))
-
-
-def _best(found: Particles, number: int) -> Particles:
-    """The `number` best particles, best first; repeated if there are fewer."""
-    order = found.costs.argsort(kind="stable")[:number]
-    order = order[np.arange(number) % len(order)]
-    return Particles(*(values[order] for values in found))
 
 
 def _other_arms(rng: np.random.Generator, body: Body, pose: Array, side: str) -> Array:

@@ -115,6 +115,9 @@ class MultiviewSettings:
     """Noise of the heading (rad)."""
     explore: Share = 0.3
     """Share of the defensive proposals in which an arm is replaced by one of another posture, so that a lost arm is found again."""
+    local: Annotated[int, Field(ge=0, le=100)] = 4
+    """Rounds of a local search after refinement: single joints of the best pose are turned at random, and what refinement made worse by
+    the particles' cost is undone. 0: none."""
     velocity: Share = 0.0
     """Share of the last frame's motion of position and heading that is added to proposals, once a frame."""
     sigma_cost: Positive = 0.003
@@ -170,6 +173,7 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "defensive": 0.0,
         "keep": 0.0,
         "explore": 0.0,
+        "local": 0,
         "velocity": 1.0,
         "silhouettes": 0.0,
         "posture": 0.0,

@@ -15,6 +15,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview import pose_search
+from shadowpuppet.tracking.multiview.local_search import LocalSearch
 from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, half_size
 from shadowpuppet.tracking.multiview.odd_camera import adapted, odd_one, suspects
 from shadowpuppet.tracking.multiview.posture_prior import PosturePrior
@@ -22,7 +23,7 @@ from shadowpuppet.tracking.multiview.proposals import Proposals
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refine, Refiner
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
-from shadowpuppet.tracking.particle_filter import Particles, Weigh
+from shadowpuppet.tracking.particle_filter import Particles, Weigh, better_of, evaluate
 from shadowpuppet.tracking.recovery import OVERLAP_DROP, settle, track_or_recover
 from shadowpuppet.tracking.resampling import Scheme, make_scheme, normalise, with_best
 from shadowpuppet.tracking.silhouette_cost import Cost
@@ -153,9 +154,11 @@ class MultiviewTracker:
             velocity = state.velocity if cycle == 0 else np.zeros_like(pose)  # the motion of a frame counts once
             poses = self.proposals(rng, selected, pose, velocity, observation.mismatch, s.cooling**cycle)
             # Step 4, refinement: move each pose by forces and moments (eqs. 32-41).
-            poses = poses if refine is None else refine(poses)
+            refined = poses if refine is None else refine(poses)
             # Step 5, weighting (eqs. 29-31); the estimate is the particle of greatest weight.
-            particles = Particles(poses, *weigh(poses))
+            particles = evaluate(refined, weigh)
+            if s.local and s.method == "hybrid":  # not in the paper
+                particles = self.local_search(rng, better_of(particles, evaluate(poses, weigh)), weigh)
             pose = particles.best if s.estimate == "best" else normalise(particles.log_weights) @ particles.poses
         return self.judge(pose, pose - state.pose, particles, observation, weigh)
 
@@ -244,6 +247,11 @@ class MultiviewTracker:
     def proposals(self) -> Proposals:
         """Draws the poses of step 3."""
         return Proposals(self.body.skeleton, self.settings, self.prior)
+
+    @cached_property
+    def local_search(self) -> LocalSearch:
+        """Varies the best pose of step 5."""
+        return LocalSearch(self.body.skeleton, self.proposals.sigma, self.settings.local)
 
     @cached_property
     def resample(self) -> Scheme:
