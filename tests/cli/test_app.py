@@ -84,6 +84,13 @@ def test_help_loads_no_kernels_and_fits_a_terminal():
         assert flag in done.stdout
 
 
+def test_a_look_loads_nothing_that_only_other_commands_need():
+    code = ("import sys, shadowpuppet.cli.recordings, shadowpuppet.cli.terminal, shadowpuppet.pipeline.prepare\n"
+            "others = {'scipy.linalg', 'scipy.spatial', 'scipy.signal', 'matplotlib', 'viser', 'shadowpuppet.live.run'}\n"
+            "print(sorted(others & set(sys.modules)))")
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
 def test_the_version_is_reported_by_the_module_too():
     child = process("--version")
     out, err = child.communicate()

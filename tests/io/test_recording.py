@@ -306,3 +306,12 @@ def test_a_file_that_is_no_film_is_said_before_its_calibration_is_read(tmp_path)
     (tmp_path / "film.mp4").write_text("no film")
     with pytest.raises(VideoError, match=r"film\.mp4: no film that can be read"):
         read_recording(tmp_path / "film.mp4", calibration=tmp_path / "nowhere.toml")
+
+
+def test_a_misspelt_name_is_answered_with_the_one_that_is_there(tmp_path):
+    (tmp_path / "mine.mp4").touch()
+    (tmp_path / "mine.txt").touch()
+    with pytest.raises(RecordingError, match=rf"or a film; did you mean {re.escape(str(tmp_path / 'mine.mp4'))}\?"):
+        read_recording(tmp_path / "mine.mpv")
+    with pytest.raises(RecordingError, match=r"or a film$"):
+        read_recording(tmp_path / "other.mov")

@@ -6,12 +6,13 @@ import av
 import cv2
 import numpy as np
 import pytest
+from films import encoded, pictures
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from made import write_film
 
 from shadowpuppet.errors import VideoError
-from shadowpuppet.video import open_frames
+from shadowpuppet.video import open_frames, seeking
 from shadowpuppet.video.seeking import Seeker
 
 RATE, FRAMES, SIZE = 20.0, 70, (64, 48)
@@ -58,6 +59,18 @@ def test_frames_that_are_passed_over_change_no_picture(tmp_path):
     with Seeker(path, SIZE) as seeker:
         for n in (17, 18, 27, 59, 3, 41):
             np.testing.assert_array_equal(seeker.at(frames[n].time), frames[n].image)
+
+
+@pytest.mark.parametrize(("name", "interval", "seeks"), [("a.mp4", 300, 0), ("a.mp4", 40, 7), ("a.mkv", 300, 13), ("a.mkv", 40, 8)])
+def test_a_film_is_decoded_on_where_no_key_frame_comes_between(tmp_path, monkeypatch, name, interval, seeks):
+    """Matroska's index is read at the first seek, and ends with the last key frame: what comes behind it is not known."""
+    path = encoded(tmp_path / name, pictures(300, SIZE), g=str(interval), sc_threshold="0", b_strategy="0", bf="3")
+    frames, sought, seek = list(open_frames(path)), list[float](), seeking._Film._seek
+    monkeypatch.setattr(seeking._Film, "_seek", lambda self, wanted: (sought.append(wanted), seek(self, wanted))[1])
+    with Seeker(path, SIZE) as seeker:
+        for n in range(0, 300, 22):
+            np.testing.assert_array_equal(seeker.at(frames[n].time), frames[n].image)
+    assert len(sought) == seeks
 
 
 def test_between_two_frames_it_is_the_nearer_and_beyond_the_ends_none(film):

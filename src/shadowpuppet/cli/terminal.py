@@ -18,7 +18,7 @@ from rich.text import Text
 from shadowpuppet.cli.look_tables import look_table
 from shadowpuppet.cli.tables import show, verdict_table
 from shadowpuppet.errors import ShadowPuppetWarning
-from shadowpuppet.live.run import LiveListener
+from shadowpuppet.live.display.listener import LiveListener
 from shadowpuppet.pipeline.look import Look, RigLook
 from shadowpuppet.pipeline.verdict.verdict import verdict_of_look
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from itertools import count, takewhile
 from pathlib import Path
 from typing import Any
@@ -100,7 +101,8 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
         raise RecordingError(f"{folder}: cannot be read ({reason(error)})") from None
     project = find_project(folder) if camera_number(path) is None else None
     if camera_number(path) is None and not exists and project is None:
-        raise RecordingError(f"{folder}: no such recording, expected a folder with video/ and calibration.toml, or a film")
+        raise RecordingError(f"{folder}: no such recording, expected a folder with video/ and calibration.toml, or a film"
+                             f"{_like(folder)}")
     if project is not None or (folder.is_dir() and (_is_own(folder) or films_in(folder))):
         return _read_folder(project.folder if project else folder, fov, calibration, project)
     if folder.is_dir() and not any(p.suffix.lower() in IMAGE_SUFFIXES for p in folder.iterdir()):
@@ -117,6 +119,16 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
     view = _without_padding(View(named[0], source))
     _check_sizes([view])
     return Recording(folder, folder.stem, (view,))
+
+
+def _like(path: Path) -> str:
+    """The film or folder beside a missing one that has nearly its name, in words."""
+    try:
+        there = [each.name for each in path.parent.iterdir() if each.is_dir() or each.suffix.lower() in FILM_SUFFIXES]
+    except OSError:
+        return ""
+    found = get_close_matches(path.name, there, 1)
+    return f"; did you mean {path.parent / found[0]}?" if found else ""
 
 
 def _is_own(folder: Path) -> bool:
@@ -231,7 +243,8 @@ def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration
         return read_calibration(calibration, sizes=size, **told)
     if len(films) > 1:
         raise RecordingError(f"{folder}: no calibration.toml for its {len(films)} cameras ({choices(films)}); several cameras must be "
-                             "calibrated together: by a board (`shadowpuppet calibrate LAB`), or by the person who walks there, from a "
+                             "calibrated together: by films of a printed board in another folder (`shadowpuppet calibrate BOARD_FOLDER`, "
+                             "docs/calibration.md), or by the person who walks there, from a "
                              f"rough.toml that says where they stand (`shadowpuppet calibrate {folder} --from-person`)")
     if fov is None:
         raise RecordingError(f"{folder}: no calibration: give the camera's horizontal field of view (--fov DEGREES, option fov; a "

@@ -17,6 +17,7 @@ from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import RunWriter, write_metrics
 from shadowpuppet.live.base_session import Given, LiveSession, Outcome
+from shadowpuppet.live.display.listener import LiveListener
 from shadowpuppet.live.display.view import Display
 from shadowpuppet.live.interrupt import Stop
 from shadowpuppet.live.phases import in_background
@@ -33,7 +34,6 @@ from shadowpuppet.live.warm_up import warm_up
 from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.pipeline.options import Options, plain_options
-from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names
 from shadowpuppet.pipeline.track import smooth_run
 from shadowpuppet.settings import validate
@@ -44,16 +44,6 @@ from shadowpuppet.video.network_stream import without_secrets
 
 IDLE = 0.05
 """Longest wait for a new picture, seconds, before the display is updated."""
-
-
-class LiveListener(Listener):
-    """Receives messages of a session. Every method does nothing: override those of interest."""
-
-    def note(self, message: str) -> None:
-        """A message for the person before the camera or at the terminal."""
-
-    def trouble(self, message: str) -> None:
-        """A problem: no usable pictures come, or the motion cannot be sent to other programs."""
 
 
 class _Nobody(Exception):

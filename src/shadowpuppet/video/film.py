@@ -6,6 +6,7 @@ import contextlib
 import math
 import re
 from collections.abc import Callable, Iterator
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,8 @@ import numpy as np
 
 from shadowpuppet.errors import VideoError, check_regular, reason, warn
 from shadowpuppet.threads import thread_limit
-from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, Wanted, check_size, size_of
+from shadowpuppet.video.frames import ASSUMED_RATE, EVERY, Frame, FrameSource, Image, Wanted, check_size, size_of
+from shadowpuppet.video.selection import Irregular, Select, Stamped, chosen
 
 if TYPE_CHECKING:
     from av import Packet, VideoFrame
@@ -69,19 +71,50 @@ def tells_times(path: Path) -> bool:
 
 
 def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float | None, wanted: Wanted) -> Iterator[Frame]:
+    """The wanted frames, of which others are left undecoded if the film's packets allow it."""
+    answers, given = list[bool](), 0
+
+    def noted(time: float) -> bool:
+        answers.append(wanted(time))
+        return answers[-1]
+
+    if wanted is not EVERY:
+        with contextlib.suppress(Irregular):
+            for frame in _shown(path, film, step, grey, rate, noted, chosen):
+                given += 1
+                yield frame
+            return
+    again = iter(answers)  # each frame is asked for once
+    yield from islice(_shown(path, film, step, grey, rate, lambda time: wanted(time) if (known := next(again, None)) is None else known,
+                             _one_by_one), given, None)
+
+
+def _one_by_one(container: InputContainer, stream: VideoStream, asked: Callable[[Stamped], bool]) -> Iterator[VideoFrame]:
+    """As `chosen`, but every frame is decoded. Raises `Break` after the last undamaged frame of a damaged film."""
+    return (frame for frame in decoded(container, stream) if asked(frame))
+
+
+def _shown(path: Path, film: FrameSource, step: float, grey: bool, rate: float | None, wanted: Wanted, select: Select) -> Iterator[Frame]:
     clock, convert, n, longest, broken = _Clock(path, step, quiet=rate is not None), converter(grey), 0, 0.0, ""
+
+    def time_shown() -> float:
+        """Time (s) of the frame asked for last."""
+        return (n - 1) / rate if rate else clock.last
+
+    def asked(frame: Stamped) -> bool:
+        nonlocal n, longest
+        before, time = clock.last, clock(frame)
+        if n > 10 and longest < 1.1 * step + 0.001 and time - before > 1.5 * step:  # steady so far, to the millisecond
+            warn(f"{path}: between {before:.3f} and {time:.3f} s frames are missing")
+        longest, n = max(longest, time - before), n + 1
+        return wanted(time_shown())
+
     with opened(path) as (container, stream):
         try:
-            for frame in decoded(container, stream):
-                before, time = clock.last, clock(frame)
-                shown = n / rate if rate else time
-                if n > 10 and longest < 1.1 * step + 0.001 and time - before > 1.5 * step:  # steady so far, to the millisecond
-                    warn(f"{path}: between {before:.3f} and {time:.3f} s frames are missing")
-                if wanted(shown):
-                    image = convert(frame)
-                    check_size(path, n, shown, image, film.size)
-                    yield Frame(shown, image)
-                longest, n = max(longest, time - before), n + 1
+            for frame in select(container, stream, asked):
+                image = convert(frame)
+                check_size(path, n - 1, time_shown(), image, film.size)
+                yield Frame(time_shown(), image)
         except Break as cause:
             broken = str(cause)
     if not broken and film.duration - clock.last > 1.5 * longest and n != film.count:  # False if the duration is unknown
@@ -185,7 +218,7 @@ class _Clock:
         self.zero, self.last, self.shift = None, -step, 0.0
         self.last_dts, self.bad_pts, self.bad_dts = -math.inf, 0, 0
 
-    def __call__(self, frame: VideoFrame) -> float:
+    def __call__(self, frame: Stamped) -> float:
         stamp, base = self._stamp(frame), frame.time_base
         if stamp is None or base is None:
             self._warn(self.last + self.step, f"has no time; times are filled in at {1 / self.step:g} frames/s")
@@ -195,7 +228,7 @@ class _Clock:
             self.last = self._increased((stamp - self.zero) * base.numerator / base.denominator + self.shift)
         return self.last
 
-    def _stamp(self, frame: VideoFrame) -> int | None:
+    def _stamp(self, frame: Stamped) -> int | None:
         # As FFmpeg's "best effort": use decoding times if presentation times went back more often than those.
         if frame.dts is not None:
             self.bad_dts += frame.dts <= self.last_dts

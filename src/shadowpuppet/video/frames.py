@@ -19,6 +19,8 @@ Size = tuple[int, int]
 """Width and height, pixels."""
 Wanted = Callable[[float], bool]
 """Whether the picture of a frame is wanted, asked once for each frame, in order, with its time (s)."""
+EVERY: Wanted = lambda _: True  # noqa: E731
+"""All frames are: they are decoded one after another."""
 
 ROUNDING = 1e-6
 """Rounding error of a time, seconds."""
@@ -48,11 +50,11 @@ class FrameSource:
     duration: float
     """Seconds; NaN if the container does not state it."""
     read: Callable[[Wanted], Iterator[Frame]] = field(repr=False)
-    """The frames that are wanted; the others are passed over without making their pictures."""
+    """The frames that are wanted; the others are passed over without making their pictures, and of most films without decoding them."""
 
     def __iter__(self) -> Iterator[Frame]:
         """Read from the start."""
-        return self.read(lambda _: True)
+        return self.read(EVERY)
 
     def between(self, begin: float, end: float) -> FrameSource:
         """The frames from `begin` on and before `end`, seconds, at the same times."""

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from av import Packet, VideoFrame
 
 MAX_DECODED = 1.0
-"""Largest step ahead, seconds, for which frames are decoded one by one; for larger steps the container's index is used."""
+"""Largest step ahead, seconds, for which frames are decoded on if the container's index does not tell whether a key frame comes between."""
 NEEDED = 4
-"""Frame intervals before the wanted time from which on every frame is decoded; of those before only what others refer to."""
+"""Frame intervals before the wanted time from which on every frame is decoded; of those before at most what others refer to."""
 
 
 class Seeker:
@@ -127,7 +127,8 @@ class _Film:
     def at(self, time: float) -> Image | None:
         self.wanted = wanted = time * self.scale
         reached = self.waiting or self.held
-        if reached is None or wanted > reached.time + MAX_DECODED or (self.held is not None and wanted < self.held.time - self.step / 4):
+        back = self.held is not None and wanted < self.held.time - self.step / 4
+        if reached is None or back or self._may_jump(reached.time, wanted):
             self._seek(wanted)
         while self.waiting is not None and self.waiting.time <= wanted:
             self._advance()
@@ -137,6 +138,17 @@ class _Film:
     def _advance(self) -> None:
         """Decode one more frame: `held` is the present frame, `waiting` the next."""
         self.held, self.waiting = self.waiting, next(self.frames, None)
+
+    def _may_jump(self, reached: float, wanted: float) -> bool:
+        """Whether a key frame lies between two times; if the index does not tell, whether they are far apart."""
+        base, entries = self.stream.time_base, self.stream.index_entries
+        if wanted <= reached + NEEDED * self.step:
+            return False
+        if self.zero is not None and base is not None:
+            key = entries.search_timestamp(self.zero + int(wanted / base))
+            if 0 <= key < len(entries) - 1:  # a last one may be that of what was read so far
+                return entries[key].timestamp > self.zero + reached / base
+        return wanted > reached + MAX_DECODED
 
     def _seek(self, wanted: float) -> None:
         """Go to the last key frame before a time, or to the start if the film has no index."""

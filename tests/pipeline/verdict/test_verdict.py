@@ -63,7 +63,8 @@ def all_cautions() -> list[Caution]:
     numbers = dict.fromkeys((field.name for field in fields(FilmCondition)), 50.0)
     film = FilmCondition(**{**numbers, "gain": (0.3, 3.0), "moved_since": None, "change": None, "copied": None})
     apart = Agreement(names=("a", "b", "c", "d"), apart=(1.0, 1.0, 50.0, 1.0), pairs=((None,) * 4,) * 4, limit=10.0, height=1.8)
-    return [*worst.warnings(), *film.warnings(), *replace(film, moved_since=1.0, change=1.0, copied=1.0).warnings(), *apart.doubts(),
+    return [*worst.warnings(), *film.warnings(), *film.warnings(recovered=True),
+            *replace(film, moved_since=1.0, change=1.0, copied=1.0).warnings(), *apart.doubts(),
             *replace(apart, apart=(50.0,) * 4).doubts(), *replace(apart, remedy="say so").doubts()]
 
 

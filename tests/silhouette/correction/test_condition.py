@@ -60,6 +60,18 @@ def test_what_is_too_much_is_named(spoil, noise, said):
     assert said in warnings[0]
 
 
+@pytest.mark.parametrize("spoil", [
+    lambda n, empty: 255 - empty if n < 4 else empty,
+    lambda n, empty: empty + cv2.resize(np.random.default_rng(1).normal(0, 14, (24, 32, 3)), (160, 120)),
+], ids=["another place", "light"])
+def test_nobody_is_told_to_film_again_what_was_never_filmed(spoil):
+    found = condition(spoil)
+    assert "again" in found.warnings()[0].short
+    for words in (found.warnings(recovered=True)[0], found.warnings(recovered=True)[0].short):
+        assert "film" in words
+        assert "again" not in words
+
+
 @pytest.mark.parametrize(("first", "since"), [(0, 0.0), (1, 1 / 25), (12, 3.0)])
 def test_a_camera_is_moved_since_the_frame_after_the_last_unmoved_one(first, since):
     assert condition(lambda n, empty: shifted(empty, 6, 3) if n >= first else empty).moved_since == pytest.approx(since)

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.distance import cdist
 
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.geometry import Array
@@ -167,6 +166,8 @@ def learn_subspaces(rng: np.random.Generator, poses: Array, settings: PriorSetti
 
 def _quantise(rng: np.random.Generator, poses: Array, settings: PriorSettings, floor: float) -> tuple[Regions, list[float]]:
     """A partition (T,) of poses (T, D) into regions, none empty, and the errors of the rounds."""
+    from scipy.spatial.distance import cdist  # takes a third of a second to import
+
     M, every, errors = settings.regions, np.arange(len(poses)), list[float]()
     different = np.unique(poses, axis=0, return_index=True)[1]
     centres = poses[rng.choice(different, M, replace=False)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.people.figures import Figure, find_floor, find_people, telling
 from shadowpuppet.tracking.people.floor import Floor
@@ -65,7 +67,8 @@ def later_sets(rig: Rig, silhouettes: Sequence[Silhouettes], after: float) -> li
     if len(ends) < len(rig.footage) or any(each.segmenter is None for each in silhouettes) or begin + min(ends) < after + LATER:
         return []
     times = np.linspace(after + LATER / 2, begin + min(ends) - LATER / 2, SETS)
-    masks = [list(_at(footage, each, times)) for footage, each in zip(rig.footage, silhouettes, strict=True)]
+    with ThreadPoolExecutor(usable_cores(), "census") as pool:
+        masks = list(pool.map(lambda footage, each: list(_at(footage, each, times)), rig.footage, silhouettes))
     return list(zip(*masks, strict=True))
 
 

@@ -118,7 +118,7 @@ def _doubts(look: Look, footage: Footage) -> list[Caution]:
                               "kept", "frames come unevenly: their own times are kept", NOTED))
     if look.exact_overlap is not None and look.exact_overlap < GOOD:
         doubts.append(unlike_ready(look.exact_overlap))
-    return [*doubts, *condition_cautions(look.condition)]
+    return [*doubts, *condition_cautions(look.condition, footage.view.background is None)]
 
 
 def _share(masks: Sequence[Mask]) -> float:

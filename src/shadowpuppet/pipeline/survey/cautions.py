@@ -50,6 +50,6 @@ def unlike_ready(overlap: float) -> Caution:
                    "silhouettes differ from those in masks/: use --masks", HARMFUL)
 
 
-def condition_cautions(condition: FilmCondition | None) -> tuple[Caution, ...]:
-    """What the film's condition may do to a run."""
-    return () if condition is None else condition.warnings()
+def condition_cautions(condition: FilmCondition | None, recovered: bool) -> tuple[Caution, ...]:
+    """What the film's condition may do to a run; `recovered`: its empty scene was recovered from the film."""
+    return () if condition is None else condition.warnings(recovered)

@@ -54,7 +54,7 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agreement(rig.cameras, first.masks, step))
     refusal = _rig_refusal(look, first)
-    recovered = any(each.recovered is not None for each in silhouettes)
+    recovered = frozenset(camera.name for camera, each in zip(look.cameras, silhouettes, strict=True) if each.recovered is not None)
     doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     if several:
         doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
@@ -84,10 +84,10 @@ def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
     return look.agreement.refusal()
 
 
-def _rig_doubts(look: RigLook, several: bool = False, recovered: bool = False) -> list[Caution]:
+def _rig_doubts(look: RigLook, several: bool = False, recovered: frozenset[str] = frozenset()) -> list[Caution]:
     """Doubts about a rig; of `several` people the quality of silhouettes, which supposes one, says nothing; silhouettes against an empty
-    scene that was `recovered` from the film may themselves be why the cameras do not fit together."""
-    unclear = recovered and look.agreement.remedy is None
+    scene that was `recovered` from the films of these cameras may themselves be why the cameras do not fit together."""
+    unclear = bool(recovered) and look.agreement.remedy is None
     doubts = [Caution(doubt, SILHOUETTES_OR_CAMERAS, RUINOUS) if unclear and doubt.weight == RUINOUS else doubt
               for doubt in look.agreement.doubts()]
     rates = np.array([camera.rate for camera in look.cameras])
@@ -105,7 +105,7 @@ def _rig_doubts(look: RigLook, several: bool = False, recovered: bool = False) -
         if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
             doubts.append(unlike_ready(camera.exact_overlap).about(f"camera {camera.name!r}"))
         quality = () if several else camera.quality.warnings()
-        warnings = (*condition_cautions(camera.condition), *clutter_cautions(camera.left_out), *quality)
+        warnings = (*condition_cautions(camera.condition, camera.name in recovered), *clutter_cautions(camera.left_out), *quality)
         doubts += [warning.about(f"camera {camera.name!r}").at_most(HARMFUL) for warning in warnings]
         doubts += [Caution(f"camera {camera.name!r}: {why}", f"camera {camera.name!r} shows no usable silhouette", HARMFUL)
                    for why in [camera.quality.refusal()] if why]

@@ -65,11 +65,12 @@ class FilmCondition:
         """Whether most of a frame is copied from the last."""
         return self.copied is not None and self.copied > COPIED
 
-    def warnings(self) -> tuple[Caution, ...]:
-        """What harms the silhouettes, and the remedy, a sentence each."""
-        return (*self._movement(), *self._light(), *self._noise(), *self._blur())
+    def warnings(self, recovered: bool = False) -> tuple[Caution, ...]:
+        """What harms the silhouettes, and the remedy, a sentence each. `recovered`: nobody filmed the empty scene, it was recovered from
+        the film."""
+        return (*self._movement(recovered), *self._light(), *self._noise(recovered), *self._blur())
 
-    def _movement(self) -> Iterator[Caution]:
+    def _movement(self, recovered: bool) -> Iterator[Caution]:
         remedy = "its frames are shifted back, and what they do not show of the scene is guessed"
         if self.moved_since is not None:
             when = "throughout" if self.moved_frames == 1 else f"from about {self.moved_since:.1f} s on"
@@ -78,7 +79,11 @@ class FilmCondition:
         elif self.moved:
             yield Caution(f"the camera moves by up to {self.moved:.1f} pixels, in {100 * self.moved_frames:.0f} % of the frames: {remedy}; "
                           "fix the tripod", f"camera shakes by {self.moved:.0f} pixels: fix the tripod", NOTED)
-        if self.unmatched > WARN_UNMATCHED:
+        if self.unmatched > WARN_UNMATCHED and recovered:
+            yield Caution(f"{100 * self.unmatched:.0f} % of the frames do not fit the empty scene that was recovered from the film: the "
+                          "person hides too much of it, or the camera moves; film it without the person, and step back",
+                          "empty scene cannot be told from the film: film it", RUINOUS)
+        elif self.unmatched > WARN_UNMATCHED:
             yield Caution(f"{100 * self.unmatched:.0f} % of the frames do not show the empty scene: the camera was moved by over a tenth "
                           "of the picture, is covered, or films another place; take the empty scene again",
                           "the empty scene is another place's: film it again", RUINOUS)
@@ -90,16 +95,17 @@ class FilmCondition:
                           "fix exposure and white balance, or take the empty scene again",
                           "light changes too much: fix exposure and white balance", HARMFUL)
 
-    def _noise(self) -> Iterator[Caution]:
+    def _noise(self, recovered: bool) -> Iterator[Caution]:
         lasts = self.change is not None and self.change < STEADY * self.noise
         if lasts and self.noise > WARN_COMPRESSION and self.compressed:
             yield Caution(f"the film is compressed too much (its pixels are {self.noise:.1f} grey levels off the empty scene): outlines "
                           "are blurred, and thin limbs merge with what is behind them; film at a higher bit rate or quality",
                           "film is compressed too much: use a higher quality", HARMFUL)
         elif lasts and self.noise > WARN_ERROR:
+            again = "film the empty scene" if recovered else "take the empty scene again"
             yield Caution(f"the film differs from its empty scene by {self.noise:.1f} grey levels in light that no smooth change explains: "
-                          "clothes like the background are missed; take the empty scene again in this light",
-                          "light differs from the empty scene's: film that again", HARMFUL)
+                          f"clothes like the background are missed; {again} in this light",
+                          f"light differs from the empty scene's: film that{'' if recovered else ' again'}", HARMFUL)
         elif self.noise > WARN_NOISE:
             yield Caution(f"the film is noisy ({self.noise:.1f} grey levels after smoothing): clothes like the background are missed; use "
                           "more light, or less gain of the camera", "film is noisy: use more light", HARMFUL)

@@ -26,7 +26,7 @@ def ready_mask(image: NDArray[np.uint8] | NDArray[np.bool_]) -> NDArray[np.bool_
         return image.astype(bool)
     if image.dtype != np.uint8:
         raise SilhouetteError(f"mask: found values of type {image.dtype}, expected 8 bits, 0 to 255 (uint8)")
-    grey = image if image.ndim == 2 else image[..., 1]
+    grey = image if image.ndim == 2 else np.ascontiguousarray(image[..., 1])
     if image.ndim == 3 and np.ptp(image[::4, ::4].astype(np.int16), axis=2).mean() > 8:
         raise SilhouetteError("mask: found a picture in colour, expected black outside and white inside the person; "
                               "pictures of the person belong under video, not masks")

@@ -7,6 +7,7 @@ that are no silhouette. A ghost (a place that all cameras see as silhouette by c
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
+from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.people.floor import ASIDE, HEIGHTS, LEGS, TRUNK, Floor, figure_points, floor_under, pixel_index
 
 NEEDED = 0.65
@@ -97,11 +99,17 @@ def find_floor(cameras: Sequence[Camera], points: Array, sets: Sequence[Sequence
     people. Where few cameras see a person the hull reaches below the floor, so that the lowest points alone do not say where it is."""
     tried = dict[float, float]()
 
+    def evidence(level: float) -> float:
+        floor = floor_under(cameras, points, level, TRIED_REACH, TRIED_NEAR)
+        return sum(figure.evidence for masks in sets for figure in find_people(floor, masks))
+
     def best(levels: Sequence[float]) -> float:
+        new = list[float]()
         for level in levels:
-            if all(abs(level - other) > 0.02 for other in tried):
-                floor = floor_under(cameras, points, level, TRIED_REACH, TRIED_NEAR)
-                tried[level] = sum(figure.evidence for masks in sets for figure in find_people(floor, masks))
+            if all(abs(level - other) > 0.02 for other in (*tried, *new)):
+                new.append(level)
+        with ThreadPoolExecutor(usable_cores(), "floor") as pool:
+            tried.update(zip(new, pool.map(evidence, new)))
         return max(tried, key=lambda level: tried[level])
 
     about = best((0.0, *np.percentile(points[:, 2], (0.5, 2, 5, 10)).tolist()))

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solveh_banded
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import filled
@@ -89,6 +88,8 @@ def solve(third: Array, measured: Array, precision: Array, variances: Array) -> 
     """Points (T, M, 3) of least squares: `third` (T - 3, 4) of `differences`, measured points and their precisions (T, M, 3), variances
     of the third differences (T - 3, M)."""
     T, M, _ = measured.shape
+    from scipy.linalg import solveh_banded  # takes a third of a second to import
+
     out, band, pairs = np.empty_like(measured), np.zeros((ORDER + 1, T)), _products(third)
     for m in range(M):
         band[:] = 0
