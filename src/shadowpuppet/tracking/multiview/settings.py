@@ -128,6 +128,9 @@ class MultiviewSettings:
     posture: NonNegative = 2e-6
     """Weight of the pull to usual postures, or those of the training motion (m^2 per squared deviation). It determines what the surface
     does not show, for example how a bend divides between pelvis and chest."""
+    arms: NonNegative = 1e-4
+    """Weight (m^2) of how rare the posture of each arm is among people, in units of a log density. It chooses between places of an arm that
+    silhouettes do not tell apart."""
     cycles: Annotated[int, Field(ge=1, le=100)] = 1
     """Estimation cycles per frame (annealing)."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
@@ -177,6 +180,7 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "velocity": 1.0,
         "silhouettes": 0.0,
         "posture": 0.0,
+        "arms": 0.0,
         "patience": 0.0,
         "odd_camera": False,
         "surface": {"epsilon": 0.3, "tau": 0.06, "nearest": "euclidean"},

@@ -15,6 +15,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview import pose_search
+from shadowpuppet.tracking.multiview.arm_postures import JOINTS, arm_directions, usual_arm_postures
 from shadowpuppet.tracking.multiview.local_search import LocalSearch
 from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, half_size
 from shadowpuppet.tracking.multiview.odd_camera import adapted, odd_one, suspects
@@ -183,13 +184,20 @@ class MultiviewTracker:
         return weigh
 
     def extra_costs(self, observation: MultiviewObservation) -> list[Cost]:
-        """Costs added to the paper's: silhouettes and posture (off in `ni2008`), and the caller's own."""
+        """Costs added to the paper's: silhouettes, posture and arms (off in `ni2008`), and the caller's own."""
         s, extras = self.settings, list[Cost]()
         if s.silhouettes:
             extras.append(lambda poses: s.silhouettes * observation.mismatch(poses))
         if s.posture:
             extras.append(lambda poses: s.posture * self.posture_prior.penalty(poses))
+        if s.arms:
+            extras.append(lambda poses: s.arms * self.rarity_of_arms(poses))
         return extras if observation.also is None else [*extras, observation.also]
+
+    def rarity_of_arms(self, poses: Array) -> Array:
+        """How rare the postures of both arms are among people, together (N,), of poses (N, D)."""
+        directions = arm_directions(self.body.points(poses, names=JOINTS))
+        return usual_arm_postures().rarity(directions.reshape(-1, 6)).reshape(-1, 2).sum(1)
 
     def refine(self, observation: MultiviewObservation, last: Array) -> Refine | None:
         """The function that refines poses (N, D); `last`: the last estimate (D,)."""
