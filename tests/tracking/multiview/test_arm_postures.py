@@ -37,7 +37,8 @@ def test_a_mirrored_person_has_the_same_arms_exchanged():
 
 
 def test_right_forward_and_up():
-    joints = np.array([[0, 0, 1], [0, 0, 1.5], [-0.2, 0, 1.5], [-0.5, 0, 1.5], [-0.5, 0.3, 1.5], [0.2, 0, 1.5], [0.2, 0, 1.2], [0.2, 0, 0.9]])
+    left, right = ([-0.2, 0, 1.5], [-0.5, 0, 1.5], [-0.5, 0.3, 1.5]), ([0.2, 0, 1.5], [0.2, 0, 1.2], [0.2, 0, 0.9])
+    joints = np.array([[0, 0, 1], [0, 0, 1.5], *left, *right])
     np.testing.assert_allclose(arm_directions(joints), [[1, 0, 0, 0, 1, 0], [0, 0, -1, 0, 0, -1]], atol=1e-9)
 
 
