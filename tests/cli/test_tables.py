@@ -116,6 +116,7 @@ def test_verdicts(printed):
     assert verdict("good", "it is dark", "it is far") == ["verdict good", "but it is dark", "it is far"]
     assert verdict("bad", "it is dark") == ["verdict bad", "because it is dark"]
     assert verdict("good") == ["verdict good"]
+    assert printed(verdict_table(SimpleNamespace(word="bad", reasons=("dark",)), "on the run")) == ["on the run bad", "because dark"]
 
 
 def test_files_that_are_there_are_named(tmp_path):

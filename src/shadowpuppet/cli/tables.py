@@ -61,10 +61,10 @@ def seen_height(height: float | None) -> str | None:
     return None if height is None else f"{height:.2f} m from end to end, with hair, shoes and what is held up"
 
 
-def verdict_table(verdict: Verdict) -> RenderableType:
+def verdict_table(verdict: Verdict, title: str = "verdict") -> RenderableType:
     """One word, and the reasons below it."""
     joined = "but" if verdict.word == "good" else "because"
-    return pairs([("verdict", verdict.word), *(("" if n else joined, reason) for n, reason in enumerate(verdict.reasons))])
+    return pairs([(title, verdict.word), *(("" if n else joined, reason) for n, reason in enumerate(verdict.reasons))])
 
 
 def files_in(folder: Path, *names: str) -> tuple[str, str]:

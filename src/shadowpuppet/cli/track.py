@@ -256,7 +256,8 @@ def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
     speed = f"{metrics['frames_per_s']:.0f} frames/s (ms a frame: {stages})"
     errors = [error_table(metrics["errors"])] if "errors" in metrics else []
     files = files_in(folder, *pictures, "overlay.mp4", "joints.csv", "angles.csv", "intervals.csv")
-    said = [verdict_table(Verdict(found["word"], tuple(found["reasons"])))] if (found := metrics.get("verdict")) else []
+    verdict = metrics.get("verdict")
+    said = [verdict_table(Verdict(verdict["word"], tuple(verdict["reasons"])), "verdict on the run")] if verdict else []
     show(*said, metrics_table(metrics), *errors, pairs([("speed", speed), files]))
 
 
