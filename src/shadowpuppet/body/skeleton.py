@@ -108,6 +108,11 @@ class Skeleton:
         return tuple(dof.name for dof in self.dofs)
 
     @cached_property
+    def dof_joints(self) -> NDArray[np.int64]:
+        """Index of each DOF's joint, (D,)."""
+        return np.array([self.joint_index(dof.joint) for dof in self.dofs], np.int64)
+
+    @cached_property
     def limits(self) -> tuple[Array, Array]:
         """Lower and upper limits of the DOF, two arrays (D,)."""
         return np.array([dof.low for dof in self.dofs]), np.array([dof.high for dof in self.dofs])
@@ -124,8 +129,7 @@ class Skeleton:
         from shadowpuppet.body.forward_kinematics import DOF_KINDS  # late, as below: naming a body does not load Numba
 
         parents = np.array([-1 if j.parent is None else self.joint_index(j.parent) for j in self.joints])
-        owners = np.array([self.joint_index(dof.joint) for dof in self.dofs], np.int64)
-        first = np.searchsorted(owners, np.arange(len(self.joints) + 1))
+        first = np.searchsorted(self.dof_joints, np.arange(len(self.joints) + 1))
         axes = np.array([AXES[dof.axis][0] for dof in self.dofs], np.int64)
         signs = np.array([AXES[dof.axis][1] for dof in self.dofs], float)
         kinds = np.array([DOF_KINDS[dof.kind] for dof in self.dofs], np.int64)

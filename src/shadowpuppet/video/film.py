@@ -71,7 +71,7 @@ def tells_times(path: Path) -> bool:
 
 
 def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float | None, wanted: Wanted) -> Iterator[Frame]:
-    """The wanted frames, of which others are left undecoded if the film's packets allow it."""
+    """The wanted frames; the others are not decoded where the film's packets allow it."""
     answers, given = list[bool](), 0
 
     def noted(time: float) -> bool:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from av.video.stream import VideoStream
 
 ONE_BY_ONE = ("h264", "hevc", "ffv1", "mjpeg")
-"""Codecs of which each packet is one frame that is shown."""
+"""Codecs in which each packet holds exactly one displayed frame."""
 HELD = 600
 """Greatest number of packets kept undecoded while no frame is chosen: a film may have a single key frame."""
 MOST_REORDERED = 16

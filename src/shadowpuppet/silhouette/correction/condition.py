@@ -66,8 +66,8 @@ class FilmCondition:
         return self.copied is not None and self.copied > COPIED
 
     def warnings(self, recovered: bool = False) -> tuple[Caution, ...]:
-        """What harms the silhouettes, and the remedy, a sentence each. `recovered`: nobody filmed the empty scene, it was recovered from
-        the film."""
+        """What harms the silhouettes, and the remedy, a sentence each. `recovered`: whether the empty scene was recovered from the film,
+        not filmed by itself."""
         return (*self._movement(recovered), *self._light(), *self._noise(recovered), *self._blur())
 
     def _movement(self, recovered: bool) -> Iterator[Caution]:

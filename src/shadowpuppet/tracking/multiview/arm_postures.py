@@ -3,19 +3,19 @@ apart, as a hand behind the hip and the same before the trunk.
 
 An arm's posture is the directions of its upper arm and forearm in the trunk's frame, so that it is the same for all bodies. Its density is
 a mixture of normal distributions, fitted to motion capture of other people by `benchmarks/fit_arm_postures.py`, and a share of a uniform
-one, for what nobody did there.
+one, for postures that are not in that data.
 """
 
 from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from importlib import resources
 
 import numpy as np
 
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, unit
 
 TABLE = "arm_postures.toml"
 """The mixture, as `benchmarks/fit_arm_postures.py` writes it."""
@@ -32,19 +32,15 @@ def arm_directions(joints: Array) -> Array:
     """Directions of upper arm and forearm (..., 2, 6) of both arms, from `JOINTS` (..., 8, 3), world: to the right, forward, and up in the
     trunk's frame. A left arm is mirrored: both are right ones."""
     pelvis, neck, *arms = np.moveaxis(joints, -2, 0)
-    up = _unit(neck - pelvis)
+    up = unit(neck - pelvis)
     across = arms[3] - arms[0]
-    right = _unit(across - (across * up).sum(-1, keepdims=True) * up)
+    right = unit(across - (across * up).sum(-1, keepdims=True) * up)
     frame = np.stack([right, np.cross(up, right), up], -2)
     found = []
     for shoulder, elbow, wrist in (arms[:3], arms[3:]):
-        bones = np.stack([_unit(elbow - shoulder), _unit(wrist - elbow)], -2)
+        bones = np.stack([unit(elbow - shoulder), unit(wrist - elbow)], -2)
         found.append(np.einsum("...ij,...bj->...bi", frame, bones).reshape(*bones.shape[:-2], 6))
     return np.stack([found[0] * MIRRORED, found[1]], -2)
-
-
-def _unit(vectors: Array) -> Array:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,15 +56,25 @@ class ArmPostures:
 
     def rarity(self, directions: Array) -> Array:
         """How rare directions (N, 6) are, (N,): minus the log density, less that of the most usual of the components' means; at least 0."""
-        return np.maximum(-self.log_density(directions) + self.log_density(self.means).max(), 0)
+        return np.maximum(-self.log_density(directions) + self._greatest, 0)
 
     def log_density(self, directions: Array) -> Array:
         """Log density (N,) of directions (N, 6)."""
-        off = directions[:, None] - self.means
-        precisions, scales = np.linalg.inv(self.covariances), np.linalg.slogdet(self.covariances)[1] + 6 * np.log(2 * np.pi)
+        off, (precisions, scales) = directions[:, None] - self.means, self._constants
         normal = -0.5 * (np.einsum("nki,kij,nkj->nk", off, precisions, off, optimize=True) + scales) + np.log(self.weights * (1 - UNKNOWN))
         uniform = np.log(UNKNOWN) - 2 * np.log(4 * np.pi) - np.log(2 * np.pi * THICKNESS**2)  # on two spheres of some thickness
         return np.logaddexp(np.logaddexp.reduce(normal, axis=1), uniform)
+
+    @cached_property
+    def _constants(self) -> tuple[Array, Array]:
+        """Inverse covariances (K, 6, 6), and the log determinants of 2 pi times the covariances (K,)."""
+        log_determinants = np.asarray(np.linalg.slogdet(self.covariances)[1], float)
+        return np.linalg.inv(self.covariances), log_determinants + 6 * np.log(2 * np.pi)
+
+    @cached_property
+    def _greatest(self) -> float:
+        """Log density at the most usual of the components' means."""
+        return float(self.log_density(self.means).max())
 
 
 @cache

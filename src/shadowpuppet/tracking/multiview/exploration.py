@@ -24,7 +24,6 @@ class Exploration:
     def __init__(self, skeleton: Skeleton, sigma: Array, share: float) -> None:
         """`sigma`: standard deviations (D,) of the noise; `share`: share of the poses in which one arm is replaced."""
         self.skeleton, self.sigma, self.share = skeleton, sigma, share
-        self.owners = np.array([skeleton.joint_index(dof.joint) for dof in skeleton.dofs])
         arms = (usual_arms(skeleton, side) for side in ("left", "right"))
         self.arms = [(skeleton.dof_indices(arm), np.stack(list(arm.values()), 1)) for arm in arms]
 
@@ -36,7 +35,7 @@ class Exploration:
         noise = scale * self.sigma * rng.standard_normal(poses.shape)
         scales = rng.choice(NOISE_SCALES, size=(len(poses), 1))
         moved = rng.random((len(poses), len(self.skeleton.joints))) < JOINT_CHANCE
-        out = poses + noise * scales * moved[:, self.owners]
+        out = poses + noise * scales * moved[:, self.skeleton.dof_joints]
         explored = round(self.share * len(poses))
         if explored:
             out[-explored:] = self._other_arms(rng, out[-explored:], mismatch)

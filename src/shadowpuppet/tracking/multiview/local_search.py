@@ -20,7 +20,6 @@ class LocalSearch:
     def __init__(self, skeleton: Skeleton, sigma: Array, rounds: int) -> None:
         """`sigma`: standard deviations (D,) of the noise; `rounds`: how often the best pose is varied."""
         self.skeleton, self.sigma, self.rounds = skeleton, sigma, rounds
-        self.owners = np.array([skeleton.joint_index(dof.joint) for dof in skeleton.dofs])
 
     def __call__(self, rng: np.random.Generator, particles: Particles, weigh: Weigh) -> Particles:
         """The N best of the particles (N) and of N / 2 variants of the best one in each round."""
@@ -34,4 +33,4 @@ class LocalSearch:
         """Copies (number, D) of a pose (D,), each with noise on the DOF of one joint."""
         joints = rng.integers(len(self.skeleton.joints), size=(number, 1))
         noise = rng.choice(NOISE_SCALES, size=(number, 1)) * self.sigma * rng.standard_normal((number, len(pose)))
-        return self.skeleton.clamp(pose + noise * (self.owners == joints))
+        return self.skeleton.clamp(pose + noise * (self.skeleton.dof_joints == joints))
