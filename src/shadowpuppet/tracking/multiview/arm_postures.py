@@ -69,7 +69,7 @@ class ArmPostures:
     def _constants(self) -> tuple[Array, Array]:
         """Inverse covariances (K, 6, 6), and the log determinants of 2 pi times the covariances (K,)."""
         log_determinants = np.asarray(np.linalg.slogdet(self.covariances)[1], float)
-        return np.linalg.inv(self.covariances), log_determinants + 6 * np.log(2 * np.pi)
+        return np.asarray(np.linalg.inv(self.covariances), float), log_determinants + 6 * np.log(2 * np.pi)
 
     @cached_property
     def _greatest(self) -> float:
