@@ -36,13 +36,19 @@ LAG = 0.1
 """Lag (s) of smoothed motion: more takes hardly more of the shaking away (docs/smoothing.md)."""
 
 
+Images = tuple[Image | None, ...]
+"""Each camera's picture; None of one that has none at that moment."""
+Masks = tuple[Mask | None, ...]
+"""Each camera's silhouette (H, W), likewise."""
+
+
 class Outcome(NamedTuple):
     """Result of processing a picture, or of waiting for one."""
 
     view: View
     frame: MotionFrame | None = None
     """Motion of the frame, as tracked; None unless a person is tracked."""
-    images: tuple[Image, ...] = ()
+    images: Images = ()
     """Each camera's picture, of the working size."""
     given: tuple[Given, ...] = ()
     """Frames for other programs, of this picture or of some before, when there is a lag."""
@@ -61,8 +67,8 @@ class _Seen(NamedTuple):
     """What is shown of a frame that waits for the next ones."""
 
     captured: float
-    images: tuple[Image, ...]
-    masks: tuple[Mask, ...]
+    images: Images
+    masks: Masks
 
 
 def at_once(task: Callable[[], Any]) -> Callable[[], Any]:
@@ -101,7 +107,7 @@ class LiveSession(ABC):
         """`TrackedSubject.lean` of each frame."""
         self._watch: RigWatch | None = None
         """Which of several cameras are set aside."""
-        self._own: tuple[Mask, ...] = ()
+        self._own: Masks = ()
         """Masks (H, W) as each of several cameras has them, before others add to them."""
         self._measured: Callable[[], Any] = lambda: None
 
@@ -175,8 +181,8 @@ class LiveSession(ABC):
         """The problem, in a sentence, if no picture has come by time `now` (s); empty if it is too early to tell."""
 
     @abstractmethod
-    def asks_again(self, now: float) -> bool:
-        """Whether a frozen camera should be opened again."""
+    def asks_again(self, now: float) -> Sequence[int]:
+        """Indices of frozen cameras that should be opened again."""
 
     @abstractmethod
     def placed(self) -> tuple[Array, float | None]:
@@ -191,26 +197,26 @@ class LiveSession(ABC):
         """Start waiting for a person."""
 
     @abstractmethod
-    def _scaled(self, shot: Any) -> tuple[Image, ...]: ...
+    def _scaled(self, shot: Any) -> Images: ...
 
     @abstractmethod
-    def _masks(self, shot: Any, images: tuple[Image, ...]) -> tuple[Mask, ...]: ...
+    def _masks(self, shot: Any, images: Any) -> Masks: ...
 
     @abstractmethod
-    def _learn(self, shot: Any, images: tuple[Image, ...]) -> Outcome: ...
+    def _learn(self, shot: Any, images: Any) -> Outcome: ...
 
     @abstractmethod
-    def _wait(self, shot: Any, images: tuple[Image, ...]) -> Outcome: ...
+    def _wait(self, shot: Any, images: Any) -> Outcome: ...
 
     @abstractmethod
-    def _measure(self, shot: Any, images: tuple[Image, ...]) -> Outcome: ...
+    def _measure(self, shot: Any, images: Any) -> Outcome: ...
 
     @abstractmethod
-    def _shown(self, images: tuple[Image, ...], masks: tuple[Mask, ...], frame: MotionFrame | None) -> dict[str, Any]:
+    def _shown(self, images: Any, masks: Any, frame: MotionFrame | None) -> dict[str, Any]:
         """The fields image, mask and picture of a `View`."""
 
     @abstractmethod
-    def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
+    def _message(self, masks: Any) -> tuple[str, float | None]:
         """Instruction to the person, and the seconds of a countdown or None."""
 
     @abstractmethod
@@ -219,7 +225,7 @@ class LiveSession(ABC):
 
     # Shared by all sessions
 
-    def _track(self, shot: Any, images: tuple[Image, ...]) -> Outcome:
+    def _track(self, shot: Any, images: Any) -> Outcome:
         assert self.subject is not None
         masks = self._masks(shot, images)
         observation = self.subject.observe(masks if self._watch is None else self._watch(shot.captured, masks, self._own))
@@ -269,7 +275,7 @@ class LiveSession(ABC):
         self.timing.pause()
         return Outcome(self._view(), given=self.rest())
 
-    def _view(self, images: tuple[Image, ...] = (), masks: tuple[Mask, ...] = (), frame: MotionFrame | None = None,
+    def _view(self, images: Images = (), masks: Masks = (), frame: MotionFrame | None = None,
               latency: float = np.nan) -> View:
         pose = None if frame is None or frame.pose is None else np.asarray(frame.pose)
         message, countdown = self._message(masks)

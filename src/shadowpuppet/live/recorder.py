@@ -36,13 +36,17 @@ class Recorder:
         """Finish the films; after an error they keep their partial names, and can be played."""
         self._open.__exit__(kind, error, trace)
 
-    def write(self, time: float, images: Sequence[Image], scenes: Sequence[list[Image]], height: float | None) -> None:
-        """Add a picture (H, W, 3) of each camera at a time (s). The first call also writes the empty scenes and the person's height (m)."""
+    def write(self, time: float, images: Sequence[Image | None], scenes: Sequence[list[Image]], height: float | None) -> None:
+        """Add a picture (H, W, 3) of each camera at a time (s); None of one without. The first one also writes the empty scenes and the
+        person's height (m), and waits until all cameras have a picture: films that begin together are in step."""
+        if not self._films and any(image is None for image in images):
+            return
         if not self._films:
             self._films = self._begin(scenes, height)
             self._first = time
         for film, image in zip(self._films, images):
-            film.write(image, time - self._first)
+            if image is not None:
+                film.write(image, time - self._first)
 
     def _begin(self, scenes: Sequence[list[Image]], height: float | None) -> list[FrameWriter]:
         for name in ("video", "background") if any(scenes) else ("video",):

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array, evenly_spread
-from shadowpuppet.live.base_session import LiveSession, Outcome, scaled
+from shadowpuppet.live.base_session import Images, LiveSession, Masks, Outcome, scaled
 from shadowpuppet.live.first_look import EmptyScene, Task, scene_of
 from shadowpuppet.live.phases import NOBODY, BackgroundCollector
 from shadowpuppet.live.rig_capture import SnapshotSet
@@ -28,6 +28,7 @@ from shadowpuppet.pipeline.rig import FrameSet, Segment
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body
 from shadowpuppet.pipeline.survey.opening import OPENED, OPENING
+from shadowpuppet.tracking.frozen import LEAST
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 from shadowpuppet.video import Image
@@ -68,6 +69,8 @@ class RigSession(LiveSession):
         self._pictures = [Picture(body, camera, camera.T_camera_world) for camera in self._worked]
         self._segment: list[Segment] = []
         self._share = SharedShadows(self._worked)
+        self._without = dict[int, str]()
+        """Cameras whose pictures cannot be used now, by index, and why."""
         self._found_again: Callable[[], list[Scene] | None] | None = None
         self._due, self._between = np.inf, FIRST_REFINED
         given = self.scene if self.scene and all(self.scene) else None
@@ -92,18 +95,24 @@ class RigSession(LiveSession):
         return self.scene
 
     def check(self, shot: SnapshotSet) -> str:
-        """The first problem of the pictures; empty if there is none."""
-        troubles = [dog.see(shot.captured, image) for dog, image in zip(self.watchdogs, shot.images)]
-        return next(filter(None, troubles), "")
+        """The first problem of the pictures. Once the person is tracked, two cameras without one suffice: the others are left out."""
+        troubles = [self._trouble(n, shot.captured, image) for n, image in enumerate(shot.images)]
+        self._without = {n: trouble for n, trouble in enumerate(troubles) if trouble}
+        there = [image for n, image in enumerate(shot.images) if image is not None and n not in self._without]
+        return "" if self.phase == "tracking" and len(there) >= LEAST else next(filter(None, troubles), "")
+
+    def _trouble(self, camera: int, now: float, image: Image | None) -> str:
+        """The problem of a camera at time `now` (s); empty if there is none."""
+        dog = self.watchdogs[camera]
+        return dog.silence(now, "", self.timing.interval) if image is None else dog.see(now, image)
 
     def silence(self, now: float, problem: str) -> str:
         """The first camera's problem if no set of pictures came; empty if there is none."""
         return next(filter(None, (dog.silence(now, problem, self.timing.interval) for dog in self.watchdogs)), "")
 
-    def asks_again(self, now: float) -> bool:
-        """Whether a frozen camera should be opened again."""
-        asking = [dog.asks_again(now) for dog in self.watchdogs]
-        return any(asking)
+    def asks_again(self, now: float) -> Sequence[int]:
+        """Indices of frozen cameras that should be opened again."""
+        return [n for n, dog in enumerate(self.watchdogs) if dog.asks_again(now)]
 
     def placed(self) -> tuple[Array, float | None]:
         """The body's frame is the world's; the floor is at Z = 0."""
@@ -117,11 +126,11 @@ class RigSession(LiveSession):
 
     def begin_waiting(self) -> None:
         """Start waiting until two cameras see a person."""
-        self._first: list[tuple[float, tuple[Mask, ...]]] = []
+        self._first: list[tuple[float, Masks]] = []
         self._hint = STEP_IN
 
-    def _learn(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
-        ready = [collector.see(shot.captured, image) for collector, image in zip(self._collectors, images)]
+    def _learn(self, shot: SnapshotSet, images: Images) -> Outcome:
+        ready = [image is not None and collector.see(shot.captured, image) for collector, image in zip(self._collectors, images)]
         if all(ready):
             films = [[image for _, image in collector.pictures.kept] for collector in self._collectors]
             self.phase, self._measured = "measuring", self.work(partial(_found_scenes, films, self._task))
@@ -137,11 +146,12 @@ class RigSession(LiveSession):
         self.scene = [[] if scene.recovered else scene.pictures for scene, _ in found]
         self._segment = [silhouettes.following() for _, silhouettes in found]
 
-    def _look_again(self, now: float, images: tuple[Image, ...], fits: bool) -> bool:
+    def _look_again(self, now: float, images: Images, fits: bool) -> bool:
         """From time to time find the scenes that were not seen empty again in all pictures so far. Whether they were, while the body does
         not fit: a person who left the place where they stood at first leaves a hole in the scene."""
         for collector, image in zip(self._collectors, images):
-            collector.pictures.add(now, image)
+            if image is not None:
+                collector.pictures.add(now, image)
         if self._found_again is None and now >= self._due and not all(self.scene):
             self._between *= 2
             self._due = now + self._between if self._between < LAST_REFINED else np.inf
@@ -155,7 +165,7 @@ class RigSession(LiveSession):
             self._seen_before(found)
         return not fits
 
-    def _track(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
+    def _track(self, shot: SnapshotSet, images: Images) -> Outcome:
         outcome = super()._track(shot, images)
         status = outcome.frame.status if outcome.frame is not None else "lost"
         if self._look_again(shot.captured, images, status == "tracked") and status in BLANK:
@@ -168,11 +178,11 @@ class RigSession(LiveSession):
         """What is wanted of the pictures at first: silhouettes."""
         return Task(self.options.silhouette, None, None)
 
-    def _wait(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
+    def _wait(self, shot: SnapshotSet, images: Images) -> Outcome:
         if self._look_again(shot.captured, images, False):
             self.begin_waiting()
         masks = self._masks(shot, images)
-        if sum(may_be_person(mask) and float(mask.mean()) > NOBODY / 3 for mask in masks) > 1:
+        if sum(mask is not None and may_be_person(mask) and float(mask.mean()) > NOBODY / 3 for mask in masks) > 1:
             self._first.append((shot.captured, masks))
         else:
             self.begin_waiting()
@@ -194,7 +204,7 @@ class RigSession(LiveSession):
 
         return tried
 
-    def _measure(self, shot: SnapshotSet, images: tuple[Image, ...]) -> Outcome:
+    def _measure(self, shot: SnapshotSet, images: Images) -> Outcome:
         """Check whether the fit is ready."""
         found: MultiviewSubject | TrackingError | list[Scene] | None = self._measured()
         if found is None:
@@ -212,13 +222,15 @@ class RigSession(LiveSession):
         super()._begin_tracking(subject)
         self._watch = RigWatch(len(self.full))
 
-    def _scaled(self, shot: SnapshotSet) -> tuple[Image, ...]:
-        return tuple(map(scaled, shot.images, self._worked))
+    def _scaled(self, shot: SnapshotSet) -> Images:
+        return tuple(None if image is None or n in self._without else scaled(image, camera)
+                     for n, (image, camera) in enumerate(zip(shot.images, self._worked)))
 
-    def _masks(self, shot: SnapshotSet, images: tuple[Image, ...]) -> tuple[Mask, ...]:
-        found = [segment(CameraFrame(shot.captured, image, None)) for segment, image in zip(self._segment, images)]
-        self._own = tuple(each.mask for each in found)
-        return tuple(mask for mask in self._share(found) if mask is not None)  # each camera has one
+    def _masks(self, shot: SnapshotSet, images: Images) -> Masks:
+        found = [None if image is None else segment(CameraFrame(shot.captured, image, None))
+                 for segment, image in zip(self._segment, images)]
+        self._own = tuple(None if each is None else each.mask for each in found)
+        return self._share(found)
 
     def _forget_time(self) -> None:
         self._watch = None if self._watch is None else RigWatch(len(self.full))
@@ -226,7 +238,7 @@ class RigSession(LiveSession):
             collector.wait()
         self._first.clear()
 
-    def _shown(self, images: tuple[Image, ...], masks: tuple[Mask, ...], frame: MotionFrame | None) -> dict[str, Any]:
+    def _shown(self, images: Images, masks: Masks, frame: MotionFrame | None) -> dict[str, Any]:
         """The field image of a `View`: a grid of all cameras, drawn here because the display shows a single picture."""
         if not images:
             return {}
@@ -235,12 +247,13 @@ class RigSession(LiveSession):
         return {"image": overlay_grid(FrameSet(found.time, images, masks or (None,) * len(images)), found, pictures)}
 
     def _aside(self) -> str:
-        """Which cameras are set aside, and why; empty if none is."""
+        """Which cameras are left out or set aside, and why; empty if none is."""
         present = {} if self._watch is None else self._watch.present
+        present = present | dict.fromkeys(self._without, "no pictures")
         names = ", ".join(f"{self.watchdogs[n].name} ({why})" for n, why in sorted(present.items()))
         return f"set aside: {names}" if names else ""
 
-    def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
+    def _message(self, masks: Masks) -> tuple[str, float | None]:
         if self.phase == "learning":
             slowest = max(self._collectors, key=lambda collector: collector.left)
             return slowest.message, slowest.left

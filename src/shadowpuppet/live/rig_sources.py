@@ -13,6 +13,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, RecordingError, SettingsError, choices
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.recording import Recording, View
+from shadowpuppet.live.base_session import Images
 from shadowpuppet.live.phases import KEPT
 from shadowpuppet.live.rig_capture import RigCapture, SnapshotSet
 from shadowpuppet.live.settings import LiveSettings
@@ -23,7 +24,7 @@ from shadowpuppet.silhouette.background import sample_frames
 from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.video import FrameSource, Image, Size, open_frames
 from shadowpuppet.video.capture import Capture
-from shadowpuppet.video.live_source import ADDRESS, Feed, film_feed, open_feed
+from shadowpuppet.video.live_source import ADDRESS, Feed, corrected, film_feed, open_feed
 
 
 class RigSources(NamedTuple):
@@ -60,7 +61,7 @@ def open_rig_sources(options: Options, settings: LiveSettings) -> RigSources:
     cameras = _calibrated(options, len(names))
     if any(name.isdecimal() or ADDRESS.match(name) for name in names):
         feeds = [open_feed(name, rate=settings.rate, speed=settings.speed, start=options.start, end=options.end) for name in names]
-        return _feeds(feeds, cameras, options)
+        return _feeds(corrected(feeds, settings.delay), cameras, settings.delay)
     recording = Recording(Path(settings.camera), "live", tuple(map(View, cameras, map(Path, names))), rate=settings.rate)
     for view in recording.views:
         _check_size(view.camera, open_frames(view.video).size)
@@ -96,15 +97,17 @@ def _check_size(camera: Camera, size: Size) -> None:
                                f"expected {size[0]} x {size[1]} as the camera gives them")
 
 
-def _feeds(feeds: list[Feed], cameras: tuple[Camera, ...], options: Options) -> RigSources:
+def _feeds(feeds: list[Feed], cameras: tuple[Camera, ...], delays: tuple[float, ...]) -> RigSources:
     for camera, feed in zip(cameras, feeds):
         _check_size(camera, feed.size)
     rates = [feed.rate for feed in feeds if np.isfinite(feed.rate)]
     rate = min(rates) if rates else 30.0
-    return RigSources(RigCapture(feeds, 1 / rate), cameras, tuple(feed.size for feed in feeds), rate, True, [], None)
+    return RigSources(RigCapture(feeds, delays), cameras, tuple(feed.size for feed in feeds), rate, True, [], None)
 
 
 def _films(rig: Rig, options: Options, settings: LiveSettings) -> RigSources:
+    if settings.delay:
+        raise SettingsError(f"delay: found {settings.delay} for films, expected cameras or streams; [start] in recording.toml is for films")
     scenes = [_scene(footage) for footage in rig.footage]
     cameras = tuple(footage.view.camera for footage in rig.footage)
     sizes = tuple(camera.size for camera in rig.cameras)
@@ -119,18 +122,16 @@ def _scene(footage: Footage) -> list[Image]:
 
 @dataclass(frozen=True)
 class _FilmSet:
-    """Synchronized films as one film: yields times (s) and tuples of pictures, one for each camera."""
+    """Synchronized films as one film: yields times (s) and tuples of pictures, one for each camera (None if it has none then)."""
 
     rig: Rig
     name: str
     size: Size
     rate: float
 
-    def __iter__(self) -> Iterator[tuple[float, tuple[Image, ...]]]:
+    def __iter__(self) -> Iterator[tuple[float, Images]]:
         for each in synchronized_frames(self.rig, [_no_mask] * len(self.rig.footage)):
-            images = tuple(image for image in each.images if image is not None)
-            if len(images) == len(self.rig.footage):
-                yield each.time, images
+            yield each.time, each.images
 
 
 def _no_mask(frame: CameraFrame) -> Segmented:
@@ -144,6 +145,6 @@ def film_set_feed(rig: Rig, speed: float = 1.0) -> Feed:
 
     def read() -> Iterator[SnapshotSet]:
         for shot in feed.read():
-            yield SnapshotSet(shot.captured, cast("tuple[Image, ...]", shot.image), shot.shown)
+            yield SnapshotSet(shot.captured, cast("Images", shot.image), shot.shown)
 
     return replace(feed, read=cast(Any, read))

@@ -39,7 +39,7 @@ from shadowpuppet.pipeline.track import smooth_run
 from shadowpuppet.settings import validate
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.video.capture import Capture
-from shadowpuppet.video.live_source import open_feed
+from shadowpuppet.video.live_source import corrected, open_feed
 from shadowpuppet.video.network_stream import without_secrets
 
 IDLE = 0.05
@@ -102,6 +102,7 @@ class _Live:
         options, settings = self.options, self.settings
         person = known_person(options)
         feed = open_feed(settings.camera, rate=settings.rate, speed=settings.speed, start=options.start, end=options.end)
+        (feed,) = corrected([feed], settings.delay)
         full = lens(options, feed.size)
         session = Session(options, settings, np.random.default_rng(options.seed), self.clock, Timing(feed.rate), in_background,
                           full=full, watchdog=CameraWatchdog(feed.name, feed.size, feed.live), person=person,
@@ -180,8 +181,8 @@ class _Live:
             self.outlets.follow(frame, age)
 
     def _keep(self, outcome: Outcome) -> None:
-        if self.session.asks_again(self.clock()):
-            self.capture.again()
+        for camera in self.session.asks_again(self.clock()):
+            self.capture.again(camera)
         if outcome.frame is None:
             self._give(outcome.given)
             return
@@ -193,7 +194,7 @@ class _Live:
         self.run_.write(outcome.frame)
         self.frames += 1
         self.listener.advance(self.frames)
-        if self.recorder is not None and outcome.images:
+        if self.recorder is not None:
             self.recorder.write(outcome.frame.time, outcome.images, self.session.scenes, self._person.person.height)
 
     @property

@@ -97,9 +97,9 @@ class Session(LiveSession):
         """The problem if no picture came; empty if there is none."""
         return self.watchdog.silence(now, problem, self.timing.interval)
 
-    def asks_again(self, now: float) -> bool:
-        """Whether the frozen camera should be opened again."""
-        return self.watchdog.asks_again(now)
+    def asks_again(self, now: float) -> Sequence[int]:
+        """The camera's index, 0, if it is frozen and should be opened again."""
+        return (0,) if self.watchdog.asks_again(now) else ()
 
     def placed(self) -> tuple[Array, float | None]:
         """The body's frame in the world (4, 4), and None: the floor is unknown with one camera."""

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.settings import STRICT
 
 Seconds = Annotated[float, Field(ge=0, le=600)]
+
+
+def _listed(value: object) -> object:
+    return tuple(value.split(",")) if isinstance(value, str) else value
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
@@ -21,6 +25,9 @@ class LiveSettings:
     cameras, give these separated by commas, in the order of the calibration, or the folder of a recording."""
     rate: Annotated[float, Field(gt=0, le=10_000)] | None = None
     """Frames/s requested from a camera, or of a film without time stamps."""
+    delay: Annotated[tuple[Annotated[float, Field(ge=0, le=10)], ...], BeforeValidator(_listed)] = ()
+    """Seconds from a picture's capture until it arrives here, of each camera or stream in turn: they are taken off the time of arrival.
+    Differences between cameras suffice to keep them in step."""
     speed: Annotated[float, Field(gt=0, le=100)] = 1.0
     """Speed at which a film is played, as a multiple of its own."""
     countdown: Seconds | None = None

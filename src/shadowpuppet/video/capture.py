@@ -57,9 +57,9 @@ class Newest(Generic[Item]):
 class Capture:
     """Reads a feed within its `with` block; `newest.take()` is the latest picture."""
 
-    def __init__(self, feed: Feed) -> None:
-        """Reading starts with the `with` block."""
-        self.feed, self.newest = feed, Newest[Snapshot]()
+    def __init__(self, feed: Feed, newest: Newest[Snapshot] | None = None) -> None:
+        """Reading starts with the `with` block; `newest`: the buffer that gets the pictures, a new one if left out."""
+        self.feed, self.newest = feed, Newest[Snapshot]() if newest is None else newest
         self.problem = ""
         """Why no pictures come, as a sentence; empty while they do."""
         self.ended = False
@@ -80,7 +80,7 @@ class Capture:
         self._stop.set()
         self._thread.join(1.0)
 
-    def again(self) -> None:
+    def again(self, _: int = 0) -> None:
         """Close and reopen the camera, for one whose picture is frozen."""
         self._again.set()
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,6 +22,8 @@ ADDRESS = re.compile(r"([a-z][a-z0-9+.-]*)://", re.IGNORECASE)
 """Beginning of a network address."""
 MAX_DELAY = 1.0
 """Seconds by which a film may lag behind its clock before the clock is set back."""
+
+
 class Snapshot(NamedTuple):
     """A picture from a feed."""
 
@@ -74,6 +76,26 @@ def open_feed(source: str | int, *, rate: float | None = None, speed: float = 1.
     film = _timed(Path(str(source)), rate)
     begin, last = span_of(start, end, film.rate, film.count / film.rate if film.count else film.duration)
     return film_feed(film.between(begin, last), speed)
+
+
+def corrected(feeds: Sequence[Feed], delays: Sequence[float]) -> list[Feed]:
+    """Live feeds with the times at which pictures were captured: those of their arrival, less a delay (s) each; the feeds if there are no
+    delays. Raises `SettingsError` for another number of delays, or a film."""
+    if delays and len(delays) != len(feeds):
+        raise SettingsError(f"delay: found {len(delays)} for {len(feeds)} cameras, expected one each")
+    return [_earlier(feed, delay) for feed, delay in zip(feeds, delays)] if delays else list(feeds)
+
+
+def _earlier(feed: Feed, delay: float) -> Feed:
+    if not feed.live:
+        raise SettingsError(f"delay: found one for the film {feed.name}, expected cameras and streams only; [start] in a recording.toml "
+                            "is for films")
+
+    def read() -> Iterator[Snapshot]:
+        for shot in feed.read():
+            yield shot._replace(captured=shot.captured - delay)
+
+    return replace(feed, read=read)
 
 
 def _camera(number: int, rate: float | None) -> Feed:

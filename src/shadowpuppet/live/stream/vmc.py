@@ -6,6 +6,7 @@ import socket
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+import numpy as np
 from pythonosc.osc_bundle import OscBundle
 from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message import OscMessage
@@ -28,10 +29,12 @@ BUNDLE_HEAD, LENGTH_FIELD = 16, 4
 
 
 def messages(avatar: Avatar, frame: StreamFrame) -> list[OscMessage]:
-    """The protocol's messages of a frame: root and bones if there is a pose; then OK and T, which end every frame."""
+    """The protocol's messages of a frame: root and bones if there is a pose; the age, which is our own; then OK and T, which
+    end every frame."""
     bones = avatar.bones(frame)
     made = [build_msg("/VMC/Ext/Root/Pos", ROOT)] if bones else []
     made += [build_msg("/VMC/Ext/Bone/Pos", (bone.name, *bone.position, *bone.rotation)) for bone in bones]
+    made += [build_msg("/shadowpuppet/age", (float(frame.age),))] if np.isfinite(frame.age) else []
     tracked = (LOADED, CALIBRATED, NORMAL, int(bool(bones)))
     return [*made, build_msg("/VMC/Ext/OK", tracked), build_msg("/VMC/Ext/T", (float(frame.time),))]
 
