@@ -1,6 +1,6 @@
 """Several streams tracked live, with their faults: error of the joints at the moment that was filmed, and latency.
 
-    python benchmarks/live_streams.py RECORDING [--cameras cam1,cam3,cam5,cam7] [--rate 15] [--seconds 10] [--rows clean,late]
+    python benchmarks/live_streams.py RECORDING [--cameras cam1,cam3,cam5,cam7] [--rate 10] [--speed 0.5] [--seconds 7] [--sessions 3]
 
 The recording's films are served as network cameras are (JPEG over HTTP), each forth and back without end after its empty scene, and `live`
 tracks them with its own settings. As the streams come from this program, it knows what was filmed when.
@@ -180,10 +180,9 @@ class Timer(Display):
         return "stop" if time.monotonic() > min(self.end, self.limit) else ""
 
 
-def row(stage: Stage, faults: Faults, seconds: float, truth: JointTable, folder: Path, record: bool) -> list[str]:
-    """Run a session; the figures of its row."""
+def session(stage: Stage, faults: Faults, seconds: float, truth: JointTable) -> list[float]:
+    """The figures of a session; NaN if nobody was tracked."""
     cameras = [view.camera.resized(stage.size) for view in stage.recording.views]
-    write_calibration(folder / "calibration.toml", cameras)
     stage.apart = 1 / stage.rate / len(cameras) if faults.apart else 0.0
     stage.start, stalled_from, ports = time.monotonic() + 1.0, PROCESSES.Value("d", np.inf), PROCESSES.Queue()
     receiver, timer = Receiver(), Timer(stalled_from, seconds)
@@ -191,22 +190,23 @@ def row(stage: Stage, faults: Faults, seconds: float, truth: JointTable, folder:
     cameraman.start()
     try:
         settings = LiveSettings(camera=",".join(f"http://127.0.0.1:{port}/" for port in ports.get(timeout=30)), countdown=0.0,
-                                learn=EMPTY - 1.0, show="none", record=record)
+                                learn=EMPTY - 1.0, show="none")
         if faults.told:
             settings = replace(settings, delay=(0.0, faults.late, *[0.0] * (len(cameras) - 2)))
-        metrics = run_live(folder / "run", Options(calibration=folder / "calibration.toml", seed=1), settings, display=timer,
-                           outlets=Outlets([receiver]))
+        with tempfile.TemporaryDirectory() as folder:
+            calibration = Path(folder) / "calibration.toml"
+            write_calibration(calibration, cameras)
+            metrics = run_live(Path(folder) / "run", Options(calibration=calibration, seed=1), settings, display=timer,
+                               outlets=Outlets([receiver]))
     finally:
         cameraman.kill()
         cameraman.join()
     for said in sorted(timer.said - {""}):
         print(f"    {said}")
-    if metrics is None:
-        return ["nobody was tracked", *[""] * 6]
-    return figures(stage, receiver, truth, seconds, metrics["live"])
+    return [np.nan] * 7 if metrics is None else figures(stage, receiver, truth, seconds, metrics["live"])
 
 
-def figures(stage: Stage, receiver: Receiver, truth: JointTable, seconds: float, live: dict[str, Any]) -> list[str]:
+def figures(stage: Stage, receiver: Receiver, truth: JointTable, seconds: float, live: dict[str, Any]) -> list[float]:
     """Poses/s, median and 95 % of the joints' errors (mm), of the latency to the pose and of the age on arrival (ms)."""
     shared = [name for name in truth.names if name in receiver.names and not name.endswith("_hand") and name != "head"]
     nodes, reference = [receiver.names.index(name) for name in shared], truth.select(shared).positions
@@ -218,10 +218,10 @@ def figures(stage: Stage, receiver: Receiver, truth: JointTable, seconds: float,
             errors.append(1000 * np.linalg.norm(frame.positions[nodes] - right, axis=1).mean())
             ages.append(1000 * frame.age)
     if not errors:
-        return ["no pose", *[""] * 6]
-    return [f"{len(errors) / seconds:.1f}", f"{np.median(errors):.0f}", f"{np.percentile(errors, 95):.0f}",
-            f"{live['latency_ms']['median']:.0f}", f"{live['latency_ms']['p95']:.0f}", f"{np.median(ages):.0f}",
-            f"{np.percentile(ages, 95):.0f}"]
+        return [np.nan] * 7
+    late = live["latency_ms"]
+    return [len(errors) / seconds, np.median(errors), np.percentile(errors, 95), late["median"], late["p95"], np.median(ages),
+            np.percentile(ages, 95)]
 
 
 def main() -> None:
@@ -232,9 +232,9 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=15.0, help="pictures/s of the streams")
     parser.add_argument("--speed", type=float, default=1.0, help="of the films; rounded to whole frames between pictures")
     parser.add_argument("--seconds", type=float, default=12.0, help="how long a session tracks")
+    parser.add_argument("--sessions", type=int, default=1, help="of which the table has the medians")
     parser.add_argument("--size", default="320x240", help="of the streams")
     parser.add_argument("--rows", default=",".join(ROWS), help="which of the table's rows")
-    parser.add_argument("--record", type=Path, help="keep the sessions' folders, with pictures, in this folder")
     args = smallest.parse(parser, lambda folder: [smallest.make(folder / "ring", smallest.RING), "--rate", 10, "--seconds", 1, "--size",
                                                   "160x120", "--rows", "clean"])
     recording, (width, height) = read_recording(args.recording), map(int, args.size.split("x"))
@@ -244,9 +244,8 @@ def main() -> None:
     stage.load()
     table = Table("streams", "poses/s", "error, mm", "95 %", "latency, ms", "95 %", "age, ms", "95 %")
     for name in args.rows.split(","):
-        with tempfile.TemporaryDirectory() as folder:
-            table.add_row(name, *row(stage, ROWS[name], args.seconds, truth, args.record / name if args.record else Path(folder),
-                                     args.record is not None))
+        found = [session(stage, ROWS[name], args.seconds, truth) for _ in range(args.sessions)]
+        table.add_row(name, *(f"{value:.0f}" if k else f"{value:.1f}" for k, value in enumerate(np.nanmedian(found, 0))))
     Console(width=120).print(table)
 
 

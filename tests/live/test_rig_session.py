@@ -243,6 +243,25 @@ def test_one_at_half_the_rate_is_in_every_second_set_and_of_two_it_leads():
     assert all(one is not None and abs(one - other) <= 0.055 for one, other in two)
 
 
+def test_a_faster_camera_is_not_waited_for():
+    sets = paired([regular(1.0), regular(1.001, 160, 0.025), regular(1.0)])[10:]
+    assert len(sets) > 28
+    assert max(now - each.captured for now, each in sets) < 0.002
+
+
+def test_a_picture_of_long_before_is_in_no_set():
+    sets = paired([[time for time in regular(1.0) if abs(time - 3.1) > 0.01], [time for time in regular(1.06) if abs(time - 3.16) > 0.01]])
+    (alone,) = [each for _, each in sets[1:] if None in each.images]
+    assert alone.images == (pytest.approx(3.2), None)
+
+
+def test_time_goes_on_when_a_late_camera_leads_again():
+    streams = [[time for time in regular(1.0, 60) if not 3.0 < time < 5.0], regular(1.04, 60)]
+    moments = [each.captured for _, each in paired(streams, (0.5, 0.0))]
+    assert min(np.diff(moments)) > 0.03
+    assert max(np.diff(moments)) < 0.7  # what the other gave while it was waited for
+
+
 def test_a_camera_that_stops_is_not_waited_for_and_taken_back():
     streams = [regular(1.0, 80), regular(1.01, 80), [time for time in regular(0.99, 80) if not 3.0 < time < 5.0]]
     sets = paired(streams)

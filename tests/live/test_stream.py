@@ -168,6 +168,7 @@ def test_a_frame_ends_with_ok_and_its_time_and_is_lost_without_bones():
     told = heard(who, posed(who))
     assert told[0] == ("/VMC/Ext/Root/Pos", ["root", 0, 0, 0, 0, 0, 0, 1])
     assert told[-2:] == [("/VMC/Ext/OK", [1, 3, 0, 1]), ("/VMC/Ext/T", [1.25])]
+    assert heard(who, posed(who)._replace(age=0.25))[-3] == ("/shadowpuppet/age", [0.25])
     assert heard(who, who.stream_frame(MotionFrame(2.0, "lost"))) == [("/VMC/Ext/OK", [1, 3, 0, 0]), ("/VMC/Ext/T", [2.0])]
 
 

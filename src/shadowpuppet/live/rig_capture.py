@@ -80,7 +80,7 @@ class Pairing:
     def __init__(self, rates: Sequence[float], delays: Sequence[float]) -> None:
         """`rates`: frames/s that the cameras state, NaN for none; `delays`: seconds from a picture's capture to its arrival."""
         self.cameras, self.delays = [_Pictures(rate) for rate in rates], tuple(delays)
-        self._led, self._moment = -1, -np.inf
+        self._moment = -np.inf
 
     def add(self, camera: int, shot: Snapshot) -> list[SnapshotSet]:
         """Add a camera's next picture; the sets that are complete now."""
@@ -98,11 +98,11 @@ class Pairing:
         middle = sorted(self.cameras[n].interval for n in giving)[len(giving) // 2]
         leader = min(giving, key=lambda n: (round(abs(middle / self.cameras[n].interval - 1), 1), n))
         interval, own = self.cameras[leader].interval, self.cameras[leader].waiting
-        while own and own[0].captured <= self._moment + (0.0 if leader == self._led else NEAR * interval):
-            own.popleft()  # pictures between two sets of the previous leader
+        while own and own[0].captured <= self._moment:
+            own.popleft()  # from before this camera led
         if not own or any(self._may_come(self.cameras[n], own[0].captured, NEAR * interval) for n in giving):
             return None
-        self._led, self._moment = leader, own[0].captured
+        self._moment = own[0].captured
         shots = [camera.nearest(self._moment, NEAR * interval) for camera in self.cameras]
         shown = [shot.shown for shot in shots if shot is not None and shot.shown is not None]
         return SnapshotSet(self._moment, tuple(None if shot is None else shot.image for shot in shots), max(shown, default=None))

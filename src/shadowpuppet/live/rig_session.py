@@ -97,7 +97,8 @@ class RigSession(LiveSession):
     def check(self, shot: SnapshotSet) -> str:
         """The first problem of the pictures. Once the person is tracked, two cameras without one suffice: the others are left out."""
         troubles = [self._trouble(n, shot.captured, image) for n, image in enumerate(shot.images)]
-        self._without = {n: trouble for n, trouble in enumerate(troubles) if trouble}
+        self._without = {n: "frozen" if self.watchdogs[n].frozen(shot.captured) else "no pictures"
+                         for n, trouble in enumerate(troubles) if trouble}
         there = [image for n, image in enumerate(shot.images) if image is not None and n not in self._without]
         return "" if self.phase == "tracking" and len(there) >= LEAST else next(filter(None, troubles), "")
 
@@ -249,7 +250,7 @@ class RigSession(LiveSession):
     def _aside(self) -> str:
         """Which cameras are left out or set aside, and why; empty if none is."""
         present = {} if self._watch is None else self._watch.present
-        present = present | dict.fromkeys(self._without, "no pictures")
+        present = present | self._without
         names = ", ".join(f"{self.watchdogs[n].name} ({why})" for n, why in sorted(present.items()))
         return f"set aside: {names}" if names else ""
 
