@@ -135,6 +135,7 @@ def test_a_table_has_a_row_a_figure_and_a_row_a_percent(tmp_path, movement):
     assert cadence["half_width_90"] == ""
     knee = [row for row in rows if (row["name"], row["side"]) == ("knee flexion", "right")]
     assert [row["percent"] for row in knee] == [str(n) for n in range(101)]
+    assert knee[0]["normal_mean"] == ""  # a degree of freedom has no band: names are those of coordinates
 
 
 def test_page_table_and_words_say_the_same(tmp_path, run, capsys):
@@ -145,6 +146,9 @@ def test_page_table_and_words_say_the_same(tmp_path, run, capsys):
     assert f"<td>{cadence} ± " in text
     assert ">knee angle<" in text
     assert 'id="cycle-' in text
+    assert ">normal<" in text
     assert cli.run(["evaluate", str(run.folder), "--movement", str(tmp_path / "movement.csv")]) == 0
     assert f"{cadence} steps/min" in capsys.readouterr().out
-    assert "knee angle" in (tmp_path / "movement.csv").read_text()
+    with (tmp_path / "movement.csv").open(newline="") as file:
+        (knee,) = [row for row in csv.DictReader(file) if (row["name"], row["side"], row["percent"]) == ("knee angle", "left", "72")]
+    assert float(knee["normal_mean"]) == pytest.approx(61.9, abs=0.1)
