@@ -16,8 +16,8 @@ from shadowpuppet.motion.contact.steps import Gait
 HIDDEN = "neck"
 """Angles that the chart leaves out: silhouettes hardly show how a head is turned. They are in movement.csv."""
 NORMAL = (" Grey: 24 young adults at a comfortable speed, one standard deviation to each side (Fukuchi, Fukuchi and Duarte 2018, CC BY "
-          "4.0; of the pelvis two bands, as it leans the other way in the other foot's cycle). Their zeros come from markers and differ by some "
-          "degrees: compare shapes and ranges; other speeds and ages walk otherwise. This is no diagnosis.")
+          "4.0; of the pelvis two bands, as it leans the other way in the other foot's cycle). Their zeros come from markers and differ by "
+          "some degrees: compare shapes and ranges; other speeds and ages walk otherwise. This is no diagnosis.")
 
 
 def movement_section(movement: Movement) -> str:
