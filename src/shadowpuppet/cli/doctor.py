@@ -314,7 +314,8 @@ def _writable(folder: Path) -> bool:
 
 
 CHECKS: tuple[tuple[str, Callable[[], Iterator[Finding]], bool], ...] = (
-    ("Python", _python, True), ("libraries", _libraries, True), ("weight", _weight, False), ("kernels", _kernels, True), ("compiled code", _cache, False),
+    ("Python", _python, True), ("libraries", _libraries, True), ("weight", _weight, False),
+    ("kernels", _kernels, True), ("compiled code", _cache, False),
     ("films", _films, True), ("codecs", _codecs, False), ("processor", _processor, False), ("extras", _extras, False),
     ("masks", _external_masks, False), ("browser", _browser, False), ("cameras", _cameras, False),
 )  # fmt: skip
