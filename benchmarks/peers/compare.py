@@ -285,7 +285,7 @@ def _smallest(folder: Path) -> list[object]:
         file = out / "landmarks" / Case(table_, name, path).place.with_suffix(".npz")
         file.parent.mkdir(parents=True)
         np.savez(file, **found)  # pyright: ignore[reportArgumentType]
-    return ["--only", "upper_body;walking", "--cold", "--shared", folder, "--folder", out, "--page", smallest.copy(PAGE, folder)]
+    return ["--only", "upper_body;walking", "--quick", "--shared", folder, "--folder", out, "--page", smallest.copy(PAGE, folder)]
 
 
 def main() -> None:
@@ -295,7 +295,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="names of recordings, tables or faults, with ; between them; all without")
     parser.add_argument("--again", action="store_true", help="also what is there already")
     parser.add_argument("--tables", action="store_true", help="only write the tables of what is there")
-    parser.add_argument("--cold", action="store_true", help="do not load the compiled kernels before; the first times are then too long")
+    parser.add_argument("--quick", action="store_true", help="one run each, kernels not loaded before: first times are too long")
     parser.add_argument("--shared", type=Path, default=multiview.SHARED, help="the shared recordings")
     parser.add_argument("--rings", type=Path, default=build / "rings", help="where the made rings are, or are made")
     parser.add_argument("--faults", type=Path, default=build / "faults", help="where the films with faults are, or are made")
@@ -306,9 +306,10 @@ def main() -> None:
     wanted = list(cases(args.shared, args.rings, args.faults))
     names = {name.strip() for name in args.only.split(";") if name.strip()}
     chosen = [case for case in wanted if not names or names & {case.table, case.row, case.path.name}]
+    chosen = [case._replace(bare=case.bare and not args.quick) for case in chosen]
     failed = 0
     if not args.tables:
-        with ProcessPoolExecutor(1, get_context("spawn"), initializer=None if args.cold else warm_up) as pool:
+        with ProcessPoolExecutor(1, get_context("spawn"), initializer=None if args.quick else warm_up) as pool:
             for case in chosen:
                 try:
                     pool.submit(compared, case, args.folder, args.again).result()
