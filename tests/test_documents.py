@@ -118,3 +118,16 @@ def test_how_to_cite_names_both_papers_wherever_it_is_said():
         text = " ".join(page.read_text("utf-8").split())
         for title in cited:
             assert title in text
+
+
+def test_the_paper_has_the_parts_that_joss_asks_for_and_cites_what_it_lists():
+    text, listed = (ROOT / "paper.md").read_text("utf-8"), (ROOT / "paper.bib").read_text("utf-8")
+    _, head, body = text.split("---\n", 2)
+    assert re.findall(r"^# (.+)$", body, re.MULTILINE) == ["Summary", "Statement of need", "State of the field", "Acknowledgements",
+                                                          "References"]
+    assert all(re.search(rf"^{key}:", head, re.MULTILINE) for key in ("title", "tags", "authors", "affiliations", "date", "bibliography"))
+    people = re.findall(r"^  - name: (.+)$", head.split("affiliations:")[0], re.MULTILINE)
+    cited = (ROOT / "CITATION.cff").read_text("utf-8").split("references:")[0]
+    assert people == re.findall(r'^  - name: "(.+)"$', cited, re.MULTILINE)
+    assert set(re.findall(r"@([a-z]+\d*)", body)) == set(re.findall(r"^@\w+\{(\w+),$", listed, re.MULTILINE))
+    assert 250 <= len(body.split()) <= 1750
