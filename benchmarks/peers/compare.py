@@ -224,7 +224,7 @@ def table(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
 
 def by_recording(found: Found, columns: Sequence[tuple[str, str, str]]) -> str:
     """A line for each recording. columns: title, program, measure (millimetres)."""
-    lines = [[f"`{one['row']}`", *[f"{one[program][key]:.0f}" if program in one else "" for _, program, key in columns]] for one in found]
+    lines = [[one["row"], *[f"{one[program][key]:.0f}" if program in one else "" for _, program, key in columns]] for one in found]
     return table(["mm", *[title for title, _, _ in columns]], lines)
 
 
@@ -250,7 +250,7 @@ def by_time(found: Found) -> str:
     lines = []
     for one in found:
         mine, other = one["ours"]["ms"], one["mediapipe"]["ms"]
-        lines.append([f"`{one['row']}`", f"{other:.1f}", f"{mine:.1f}", f"{other / mine:.1f}"])
+        lines.append([one["row"], f"{other:.1f}", f"{mine:.1f}", f"{other / mine:.1f}"])
     return table(["processor time, ms a frame", "MediaPipe", "shadowpuppet", "ratio"], lines)
 
 
