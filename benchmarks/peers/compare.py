@@ -21,6 +21,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -273,7 +274,8 @@ def tables(found: Found) -> dict[str, str]:
 def _smallest(folder: Path) -> list[object]:
     """Two tiny recordings with landmarks that are the truth and some noise: MediaPipe is not installed for this."""
     rng, out, chosen = np.random.default_rng(1), folder / "out", list(LANDMARKS.values())
-    for table_, name, spec in ((ONE_SHARED, "upper_body", smallest.ONE), (SEVERAL_SHARED, "walking", smallest.RING)):
+    ring = replace(smallest.RING, rate=6)
+    for table_, name, spec in ((ONE_SHARED, "upper_body", smallest.ONE), (SEVERAL_SHARED, "walking", ring)):
         path = smallest.make(folder / "recordings" / name, spec)
         truth, found = read_truth(path / "truth.csv").select(LIMB_JOINTS), dict[str, Array]()
         for camera in (view.camera for view in read_recording(path).views):
