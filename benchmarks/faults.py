@@ -86,9 +86,14 @@ class Measures(NamedTuple):
     """Mean joint error, metres, that the stated standard deviations lead one to expect."""
 
 
+def place_of(film: Spec, row: Row, folder: Path) -> Path:
+    """Folder of the recording with the fault."""
+    return folder / f"{film.name} {row.name}".replace(" ", "_").replace(":", "")
+
+
 def made(film: Spec, row: Row, folder: Path, again: bool) -> Path:
     """Folder of the recording with the fault; made if it is missing or of another spec."""
-    spec, path = row.of(film), folder / f"{film.name} {row.name}".replace(" ", "_").replace(":", "")
+    spec, path = row.of(film), place_of(film, row, folder)
     done = path / "made"
     if again or not done.exists() or read_spec(path / "spec.toml") != spec:
         shutil.rmtree(path, ignore_errors=True)
@@ -117,7 +122,7 @@ def _measured(path: Path, seed: int, truth: JointTable, seen: Sequence[bool], ex
             warnings.simplefilter("ignore")
             cache, options = SilhouetteCache(), make_options({"seed": seed})
             run = track_recording(path, path / "run", options, cache=cache)
-            motion, metrics = _nearest(path / "run", run, truth)
+            motion, metrics = nearest_person(path / "run", run, truth)
     except ShadowPuppetError as error:
         count = len(truth.times)
         return Measures(truth.times, np.where(_upto(seen, count), LOST_ERROR, np.nan), np.full(count, np.nan), np.full(count, "lost"),
@@ -143,7 +148,7 @@ def _aside(run: Summary, motion: Motion) -> tuple[str, ...]:
                  for time in motion.times.tolist())
 
 
-def _nearest(folder: Path, run: Summary, truth: JointTable) -> tuple[Motion, dict[str, Any]]:
+def nearest_person(folder: Path, run: Summary, truth: JointTable) -> tuple[Motion, dict[str, Any]]:
     """Motion and metrics of a run; of several people those of the one who is nearest to the truth."""
     if "people" not in run.metrics:
         return run.motion, run.metrics

@@ -7,10 +7,12 @@ A line of one of these forms is replaced in a page:
     <!-- help: COMMAND -->     the output of `shadowpuppet COMMAND --help`
     <!-- presets -->           the settings that each preset changes
     <!-- example: FILE -->     the code of examples/FILE
+    <!-- gallery -->           every example: what it is, its picture, its code
 """
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import subprocess
@@ -29,7 +31,7 @@ from shadowpuppet.synthetic.spec import TABLES, Spec
 from shadowpuppet.tracking.monocular.settings import INITIALIZATION_PRESETS, PRESETS
 from shadowpuppet.tracking.multiview.settings import MULTIVIEW_PRESETS
 
-MARKER = re.compile(r"^<!-- (settings|spec|help|presets|example)(?:: (.*?))? -->$", re.MULTILINE)
+MARKER = re.compile(r"^<!-- (settings|spec|help|presets|example|gallery)(?:: (.*?))? -->$", re.MULTILINE)
 BUNDLE = '<script src="assets/javascripts/bundle'
 FROM_DISK = "assets/search_from_disk.js"
 QUOTES = '"""'
@@ -109,7 +111,21 @@ def example(name: str) -> str:
     return f"```python\n{code.split(QUOTES, 2)[2].strip()}\n```"
 
 
-MAKERS = {"settings": settings_table, "spec": spec_table, "help": help_text, "presets": presets, "example": example}
+def gallery() -> str:
+    """A section for every example: its docstring, its picture where it leaves one, and its code, folded."""
+    parts = []
+    for path in sorted((Path(__file__).parents[1] / "examples").glob("*.py")):
+        title = path.stem[3:].replace("_", " ")
+        told = (ast.get_docstring(ast.parse(path.read_text("utf-8"))) or "").split("\n\n")
+        picture = f"assets/example_{path.name[:2]}.webp"
+        shown = [f"![What {path.name} leaves]({picture})"] if (Path(__file__).parent / picture).exists() else []
+        code = example(path.name).replace("\n", "\n    ")
+        folded = f'??? note "examples/{path.name}"\n\n    {code}'
+        parts += [f"## {int(path.name[:2])}. {title[0].upper()}{title[1:]}", *told, *shown, folded]
+    return "\n\n".join(parts)
+
+
+MAKERS = {"settings": settings_table, "spec": spec_table, "help": help_text, "presets": presets, "example": example, "gallery": gallery}
 
 
 def _plain(value: Any) -> str:

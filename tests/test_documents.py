@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import shadowpuppet
+from shadowpuppet.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -64,7 +65,9 @@ def test_an_array_without_a_shape_would_be_noticed():
 
 
 def shown(page: Path) -> set[str]:
-    return set(re.findall(r"!\[[^]]*\]\((?:docs/)?(assets/[^)]+)\)", page.read_text("utf-8")))
+    text = page.read_text("utf-8")
+    text = hooks()["on_page_markdown"](text) if "<!-- gallery -->" in text else text
+    return set(re.findall(r"!\[[^]]*\]\((?:docs/)?(assets/[^)]+)\)", text))
 
 
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
@@ -118,3 +121,31 @@ def test_how_to_cite_names_both_papers_wherever_it_is_said():
         text = " ".join(page.read_text("utf-8").split())
         for title in cited:
             assert title in text
+
+
+def test_the_paper_has_the_parts_that_joss_asks_for_and_cites_what_it_lists():
+    text, listed = (ROOT / "paper.md").read_text("utf-8"), (ROOT / "paper.bib").read_text("utf-8")
+    _, head, body = text.split("---\n", 2)
+    assert re.findall(r"^# (.+)$", body, re.MULTILINE) == ["Summary", "Statement of need", "State of the field", "Acknowledgements",
+                                                          "References"]
+    assert all(re.search(rf"^{key}:", head, re.MULTILINE) for key in ("title", "tags", "authors", "affiliations", "date", "bibliography"))
+    people = re.findall(r"^  - name: (.+)$", head.split("affiliations:")[0], re.MULTILINE)
+    cited = (ROOT / "CITATION.cff").read_text("utf-8").split("references:")[0]
+    assert people == re.findall(r'^  - name: "(.+)"$', cited, re.MULTILINE)
+    assert set(re.findall(r"@(\w+)", body)) == set(re.findall(r"^@\w+\{(\w+),$", listed, re.MULTILINE))
+    assert 250 <= len(body.split()) <= 1750
+
+
+def test_the_gallery_has_every_example_with_what_it_leaves():
+    text = hooks()["on_page_markdown"]("<!-- gallery -->")
+    assert text.count("\n\n??? note") == len(list((ROOT / "examples").glob("*.py")))
+    pictures = runpy.run_path(str(DOCS / "make_gallery.py"))["LEFT"]
+    assert [f"assets/example_{number}.webp" for number in pictures] == re.findall(r"\((assets/.+)\)", text)
+
+
+def test_the_commands_of_the_recipes_are_understood():
+    lines = re.findall(r"^    shadowpuppet (.+?)(?:  .*)?$", (DOCS / "tasks.md").read_text("utf-8"), re.MULTILINE)
+    assert len(lines) > 15
+    for line in lines:
+        command, *_ = app.parse_args(line, exit_on_error=False, print_error=False)
+        assert command.__name__.strip("_") == line.split()[0]

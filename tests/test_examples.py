@@ -61,6 +61,9 @@ def test_examples_run_and_say_something(example, recording, ring, reaching, tmp_
     SHOWN.get(example.name[:2], lambda left: None)(left)
     for name in MADE.get(example.name[:2], []):
         assert (tmp_path / name).stat().st_size > 0
+    gallery = runpy.run_path(str(ROOT / "docs" / "make_gallery.py"))
+    if example.name[:2] in gallery["LEFT"]:
+        assert gallery["picture_of"](example.name[:2], tmp_path).std() > 10
 
 
 def tournament_selects(left):

@@ -119,8 +119,8 @@ def check(**changes):
     agreement = SimpleNamespace(names=("a", "b", "c"), apart=(1.04, None, 9.0), wrong=("c",), limit=12.8, height=1.756,
                                 pairs=((None, 1.0, 1.0), (1.0, None, None), (1.0, 1.0, None)))  # fmt: skip
     lateness = SimpleNamespace(frames=(-0.04, None, 2.25), spread=(0.1, None, 0.34))
-    plain = {"recording": "lab", "sets": 240, "rate": 25.0, "frame_rate": 50.0, "agreement": agreement, "by_sound": False, "still": False,
-             "sound": None, "lateness": lateness, "good": False, "doubts": ("this", "that"), "turns": {}, "late": ("c",)}  # fmt: skip
+    plain = {"recording": "lab", "sets": 240, "rate": 25.0, "frame_rate": 50.0, "agreement": agreement, "by_clock": False, "still": False,
+             "clock": None, "lateness": lateness, "good": False, "doubts": ("this", "that"), "turns": {}, "late": ("c",)}  # fmt: skip
     return SimpleNamespace(**(plain | changes))
 
 
@@ -132,13 +132,13 @@ def test_how_far_cameras_disagree(printed):
         "a 1.0 px 2 others 0.0 frames ± 0.1", "b unknown 1 others cannot tell", "c 9.0 px 2 others 2.2 frames ± 0.3 wrong: place and time",
         "verdict this", "that",
     ]  # fmt: skip
-    heard = SimpleNamespace(names=("a", "b", "c"), seconds=(0.0, -0.041, None))
-    found = printed(check_table(check(by_sound=True, sound=heard, good=True, late=(), turns={"a": 1}, lateness=None)))
+    heard = SimpleNamespace(by="sound", names=("a", "b", "c"), seconds=(0.0, -0.041, None))
+    found = printed(check_table(check(by_clock=True, clock=heard, good=True, late=(), turns={"a": 1}, lateness=None)))
     assert found[4:6] == ["time by the films' sound", "sound late by a +0.0, b -2.1 frames"]
     assert found[7] == "a 1.0 px 2 others cannot tell wrong: place"
     assert found[-1] == "verdict all cameras agree"
-    silent = SimpleNamespace(names=("a",), seconds=(None,))
-    found = printed(check_table(check(still=True, sound=silent)))
+    silent = SimpleNamespace(by="sound", names=("a",), seconds=(None,))
+    found = printed(check_table(check(still=True, clock=silent)))
     assert found[4:6] == ["time cannot tell: nobody moves enough", "sound the films share no sound that stands out"]
 
 

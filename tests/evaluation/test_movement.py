@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
+import c3d
 import numpy as np
 import pytest
 import runs
@@ -18,6 +20,7 @@ from shadowpuppet.evaluation.evaluation import measure_run
 from shadowpuppet.evaluation.movement.angles import HEADING, Angle, joint_angles, ranges
 from shadowpuppet.evaluation.movement.movement import Movement, movement_of, write_movement
 from shadowpuppet.evaluation.report.movement_section import movement_section
+from shadowpuppet.io.export import export_run
 from shadowpuppet.io.intervals import HALF_WIDTH
 from shadowpuppet.io.motion.opensim.coordinates import coordinates
 from shadowpuppet.io.person import Person, write_person
@@ -135,6 +138,23 @@ def test_a_table_has_a_row_a_figure_and_a_row_a_percent(tmp_path, movement):
     assert cadence["half_width_90"] == ""
     knee = [row for row in rows if (row["name"], row["side"]) == ("knee flexion", "right")]
     assert [row["percent"] for row in knee] == [str(n) for n in range(101)]
+    assert knee[0]["normal_mean"] == ""  # a degree of freedom has no band: names are those of coordinates
+
+
+def test_strikes_in_a_c3d_file_are_those_of_the_strides(tmp_path, run, movement):
+    export_run(run.folder, ["c3d"], tmp_path)
+    with next(tmp_path.rglob("*.c3d")).open("rb") as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the reader, where a parameter of ours is not one that it looks for
+        parameters = c3d.Reader(file)
+        times = parameters.get("EVENT:TIMES").float_array.reshape(-1, 2)[:, 1]
+        labels, sides = ([word.strip() for word in parameters.get(f"EVENT:{name}").string_array] for name in ("LABELS", "CONTEXTS"))
+    found = list(zip(labels, sides))
+    strikes = {side: times[[each == ("Foot Strike", side.capitalize()) for each in found]] for side in SIDES}
+    assert movement.gait.strides
+    for stride in movement.gait.strides:
+        for end in (stride.begin, stride.end):
+            assert np.abs(strikes[stride.side] - end).min() < 1e-3
+    assert labels.count("Foot Off") >= len(movement.gait.strides)
 
 
 def test_page_table_and_words_say_the_same(tmp_path, run, capsys):
@@ -145,6 +165,9 @@ def test_page_table_and_words_say_the_same(tmp_path, run, capsys):
     assert f"<td>{cadence} ± " in text
     assert ">knee angle<" in text
     assert 'id="cycle-' in text
+    assert ">normal<" in text
     assert cli.run(["evaluate", str(run.folder), "--movement", str(tmp_path / "movement.csv")]) == 0
     assert f"{cadence} steps/min" in capsys.readouterr().out
-    assert "knee angle" in (tmp_path / "movement.csv").read_text()
+    with (tmp_path / "movement.csv").open(newline="") as file:
+        (knee,) = [row for row in csv.DictReader(file) if (row["name"], row["side"], row["percent"]) == ("knee angle", "left", "72")]
+    assert float(knee["normal_mean"]) == pytest.approx(61.9, abs=0.1)

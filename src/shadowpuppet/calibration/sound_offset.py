@@ -7,7 +7,6 @@ are most alike is their offset. Levels, distance and echoes change an onset's st
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 from scipy.signal import ShortTimeFFT, windows
 
+from shadowpuppet.calibration.clock_offset import ClockOffsets
 from shadowpuppet.geometry import Array
 
 RATE = 8000
@@ -43,21 +43,8 @@ PRECISION = 0.002
 """Standard deviation of an offset without echoes, seconds."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class SoundOffsets:
-    """Time offsets of films by their sound; plain values."""
-
-    names: tuple[str, ...]
-    """Names of the cameras."""
-    seconds: tuple[float | None, ...]
-    """By which each film is late (negative: early): what is heard comes that much later on its clock than on most others'; None if nothing
-    stands out."""
-    spread: tuple[float | None, ...]
-    """Half-width of the 90 % interval, seconds: the sound's way to the cameras, and how the pairs differ."""
-
-
 def sound_offsets(names: Sequence[str], sounds: Sequence[Array | NDArray[np.float32] | None], begins: Sequence[float],
-                  centres: Array) -> SoundOffsets:
+                  centres: Array) -> ClockOffsets:
     """Offsets of films from their sound.
 
     Args:
@@ -75,7 +62,7 @@ def sound_offsets(names: Sequence[str], sounds: Sequence[Array | NDArray[np.floa
             way = float(np.linalg.norm(centres[i] - centres[j])) / SPEED_OF_SOUND
             pairs.append((i, j, shift + begins[j] - begins[i], way))
     seconds, spread = _solved(len(names), pairs)
-    return SoundOffsets(names=tuple(names), seconds=seconds, spread=spread)
+    return ClockOffsets(by="sound", names=tuple(names), seconds=seconds, spread=spread)
 
 
 def onset_strengths(samples: Array | NDArray[np.float32]) -> Array:

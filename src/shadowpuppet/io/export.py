@@ -40,7 +40,8 @@ from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.body_animation import BodyTree, motion_animation
-from shadowpuppet.motion.contact.contact import FootEvent, contacts_of, foot_events
+from shadowpuppet.motion.contact.contact import FootEvent, contacts_of
+from shadowpuppet.motion.contact.stances import find_stances, stance_events
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.limbs import DOUBTFUL, limb_of
 from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
@@ -250,9 +251,12 @@ class _RunExport:
 
     @property
     def events(self) -> list[FootEvent]:
-        """When the feet meet the floor and leave it; empty for a run without soles."""
-        contacts = contacts_of(self.run.motion.table)
-        return [] if contacts is None else foot_events(self.run.motion.times, contacts)
+        """When the feet meet the floor and leave it, as the movement report has it; empty for a run without soles."""
+        motion = self.run.motion
+        contacts = contacts_of(motion.table)
+        if contacts is None:
+            return []
+        return stance_events(find_stances(motion.times, contacts, motion.joint_names, motion.joints, motion.joint_sd))
 
     @property
     def spread(self) -> Array:

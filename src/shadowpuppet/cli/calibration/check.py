@@ -53,25 +53,26 @@ def check_table(check: CalibrationCheck) -> RenderableType:
     """How far each camera disagrees with the others, and the verdict."""
     found = check.agreement
     columns = ("camera", "disagrees by", "with", "late by", "90 % within", "")
+    clock = "clock" if check.clock is None else check.clock.by
     rows: list[tuple[str, str | None]] = [
         ("recording", check.recording),
         ("compared", f"{check.sets} sets of silhouettes, {check.rate:.4g} a second, of {check.frame_rate:.4g} frames/s"),
         ("limit", f"{found.limit:.1f} px; cameras that fit are apart by about one"),
         ("seen", seen_height(found.height)),
-        ("time", "by the films' sound" if check.by_sound else "cannot tell: nobody moves enough" if check.still else None),
-        ("sound", _heard(check)),
+        ("time", f"by the films' {clock}" if check.by_clock else "cannot tell: nobody moves enough" if check.still else None),
+        (clock, _stated(check)),
     ]
     verdict = "all cameras agree" if check.good else "\n".join(check.doubts)
     return Group(pairs(rows), "", table("", columns, _agreement_rows(check), right=(1, 3, 4)), "", pairs([("verdict", verdict)]))
 
 
-def _heard(check: CalibrationCheck) -> str | None:
-    """Offsets by sound, in frames."""
-    if check.sound is None:
+def _stated(check: CalibrationCheck) -> str | None:
+    """Offsets by the films' clocks, in frames."""
+    if check.clock is None:
         return None
-    heard = [f"{name} {seconds * check.frame_rate:+.1f}" for name, seconds in zip(check.sound.names, check.sound.seconds)
+    stated = [f"{name} {seconds * check.frame_rate:+.1f}" for name, seconds in zip(check.clock.names, check.clock.seconds)
              if seconds is not None]
-    return f"late by {', '.join(heard)} frames" if heard else "the films share no sound that stands out"
+    return f"late by {', '.join(stated)} frames" if stated else "the films share no sound that stands out"
 
 
 def _agreement_rows(check: CalibrationCheck) -> Iterator[tuple[Any, ...]]:

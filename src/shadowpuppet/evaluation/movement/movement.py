@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.evaluation.movement.angles import PERCENT, Cycle, Range, cycles, joint_angles, ranges
 from shadowpuppet.evaluation.movement.gait_figures import Figure, gait_figures
+from shadowpuppet.evaluation.movement.normal_walking import Normal, normal_walking
 from shadowpuppet.io.files.table import cells, csv_line
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.run import Run
@@ -20,7 +21,7 @@ from shadowpuppet.motion.contact.contact import SOLES, contacts_of
 from shadowpuppet.motion.contact.steps import Gait, find_gait
 from shadowpuppet.motion.motion import Motion
 
-COLUMNS = ("name", "side", "unit", "percent", "count", "mean", "sd", "half_width_90")
+COLUMNS = ("name", "side", "unit", "percent", "count", "mean", "sd", "half_width_90", "normal_mean", "normal_sd")
 """Of movement.csv."""
 SHORTEST = 3
 """Frames that a movement has at least."""
@@ -39,6 +40,12 @@ class Movement:
     """Angles over the gait cycle; none without a full stride."""
     ranges: Sequence[Range]
     """Ranges of angles of a motion without a full stride."""
+
+    def normal(self, cycle: Cycle) -> Normal | None:
+        """The angle of a cycle in normal walking; None for one that is not known, and in a run: there each foot is on the floor for less
+        than half of the stride."""
+        walks = any(each.name == "stance" and each.both.mean > 50 for each in self.figures)
+        return normal_walking(cycle.name, cycle.side) if walks else None
 
 
 def gait_of(run: Run) -> tuple[Gait | None, str]:
@@ -90,15 +97,16 @@ def write_movement(path: str | Path, movement: Movement) -> None:
 def _lines(movement: Movement) -> Iterator[list[str]]:
     for each in movement.figures:
         for side, own in zip((*SIDES, "both"), (each.left, each.right, each.both)):
-            yield [each.name, side, each.unit, "", str(own.number), *cells([own.mean, own.sd, own.stated], 4)]
-        yield [f"{each.name}: symmetry", "", "%", "", "", *cells([each.symmetry, np.nan, np.nan], 2)]
+            yield [each.name, side, each.unit, "", str(own.number), *cells([own.mean, own.sd, own.stated], 4), "", ""]
+        yield [f"{each.name}: symmetry", "", "%", "", "", *cells([each.symmetry, np.nan, np.nan], 2), "", ""]
     for each in movement.cycles:
-        for percent, *values in zip(PERCENT, each.mean, each.sd, each.stated):
+        unknown = np.full(len(PERCENT), np.nan)
+        for percent, *values in zip(PERCENT, each.mean, each.sd, each.stated, *(movement.normal(each) or (unknown, unknown))):
             yield [each.name, each.side, "deg", f"{percent:.0f}", str(each.number), *cells(values, 3)]
     for each in movement.ranges:
         for name, unit, value, stated in (("minimum", "deg", each.low, each.stated), ("maximum", "deg", each.high, each.stated),
                                           ("range", "deg", each.high - each.low, np.nan), ("peak speed", "deg/s", each.speed, np.nan)):
-            yield [f"{each.name}: {name}", each.side, unit, "", str(each.frames), *cells([value, np.nan, stated], 3)]
+            yield [f"{each.name}: {name}", each.side, unit, "", str(each.frames), *cells([value, np.nan, stated], 3), "", ""]
 
 
 def _sure(motion: Motion) -> NDArray[np.bool_]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from shadowpuppet.evaluation.error_metrics import hinge_angles, true_stretches
 from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.evaluation.movement.angles import PERCENT, Cycle
+from shadowpuppet.evaluation.movement.normal_walking import Normal
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.io.intervals import HALF_WIDTH
 from shadowpuppet.io.motion.table import dof_unit
@@ -29,6 +30,7 @@ POINTS = 1200
 """Greatest number of points of a line; more do not show."""
 COLUMNS = 3
 """Panels of angles in a row."""
+USUAL = "#d3d7dc"
 INK = "#2b2f36"
 STYLE = {"svg.fonttype": "none", "font.size": 9.5, "axes.edgecolor": "#c4c9d0", "axes.labelcolor": INK, "text.color": INK,
          "xtick.color": "#5b6470", "ytick.color": "#5b6470", "axes.grid": True, "grid.color": "#e6e9ed", "grid.linewidth": 0.8,
@@ -225,8 +227,9 @@ def bland_altman(of: Evaluation) -> str:
         return _svg(figure, "agreement")
 
 
-def gait_cycle(cycles: Sequence[Cycle], stance: Mapping[str, float]) -> str:
-    """Every angle over the gait cycle, both sides in one panel, with `stance`, % of the cycle by side, dotted."""
+def gait_cycle(cycles: Sequence[Cycle], normal: Callable[[Cycle], Normal | None], stance: Mapping[str, float]) -> str:
+    """Every angle over the gait cycle, both sides in one panel, before the band of what is normal, one standard deviation to each side, and
+    with `stance`, % of the cycle by side, dotted."""
     panels = list(dict.fromkeys(each.name for each in cycles))
     rows = -(-len(panels) // COLUMNS)
     with _drawing("cycle", (10, 0.6 + 1.6 * rows), rows, (1,) * rows, COLUMNS) as (figure, grid):
@@ -235,6 +238,9 @@ def gait_cycle(cycles: Sequence[Cycle], stance: Mapping[str, float]) -> str:
             axes.set_axis_off()
         for each in cycles:
             axes, colour = places[each.name], SIDES[each.side]
+            if usual := normal(each):
+                low, high = usual.mean - usual.sd, usual.mean + usual.sd
+                axes.fill_between(PERCENT, low, high, color=USUAL, alpha=0.6, lw=0, zorder=0.5, label="normal")
             axes.fill_between(PERCENT, each.mean - each.stated, each.mean + each.stated, color=colour, alpha=0.1, lw=0)
             axes.fill_between(PERCENT, each.mean - each.sd, each.mean + each.sd, color=colour, alpha=0.35, lw=0)
             axes.plot(PERCENT, each.mean, color=colour, lw=1.4, label=each.side)

@@ -15,6 +15,9 @@ from shadowpuppet.motion.contact.steps import Gait
 
 HIDDEN = "neck"
 """Angles that the chart leaves out: silhouettes hardly show how a head is turned. They are in movement.csv."""
+NORMAL = (" Grey: 24 young adults at a comfortable speed, one standard deviation to each side (Fukuchi, Fukuchi and Duarte 2018, CC BY "
+          "4.0; of the pelvis two bands, as it leans the other way in the other foot's cycle). Their zeros come from markers and differ by "
+          "some degrees: compare shapes and ranges; other speeds and ages walk otherwise. This is no diagnosis.")
 
 
 def movement_section(movement: Movement) -> str:
@@ -34,15 +37,16 @@ def _gait(movement: Movement) -> Iterator[str]:
     yield ("<p class=said>Mean and standard deviation over the steps or strides. 90 %: half the interval by the run's own statement, which "
            "more steps do not make narrower; the error of times is not stated. Left to right: left less right over their mean.</p>")
     if shown := [each for each in movement.cycles if not each.name.startswith(HIDDEN)]:
-        yield f"<h3>Angles over the gait cycle, degrees</h3>{figure(charts.gait_cycle(shown, _stance(gait)), _note())}"
+        chart = charts.gait_cycle(shown, movement.normal, _stance(gait))
+        yield f"<h3>Angles over the gait cycle, degrees</h3>{figure(chart, _note(movement))}"
 
 
-def _note() -> str:
+def _note(movement: Movement) -> str:
     return ("From a strike of the foot, 0 %, to its next; dotted where it leaves the floor. Green is the left foot's cycle, pink the "
             "right's. The line is the mean over the strides, the dark band their standard deviation, the pale one 90 % by the run's own "
             "statement. Positive: pelvis tilted forward, down on the right, turned to the left; hip and arm forward, inward, turned "
             "inward; knee and elbow bent; ankle up; sole inward; trunk backward, to the right, turned to the left. Of the pelvis' "
-            "rotation each cycle's mean and drift are removed.")
+            "rotation each cycle's mean and drift are removed." + (NORMAL if any(map(movement.normal, movement.cycles)) else ""))
 
 
 def _stance(gait: Gait) -> dict[str, float]:

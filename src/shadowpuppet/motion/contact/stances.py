@@ -14,7 +14,7 @@ import numpy as np
 
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.contact.contact import Contacts, foot_events
+from shadowpuppet.motion.contact.contact import Contacts, FootEvent, foot_events
 from shadowpuppet.motion.interpolation import filled
 
 SAME_PLACE, SAME_TIME = 0.1, 0.3
@@ -50,6 +50,12 @@ def find_stances(times: Array, contacts: Contacts, names: Sequence[str], positio
     if cycles and np.median([stands / lasts for stands, lasts in cycles]) > WALKS:
         found = _by_ankles(found, times, list(names), positions, float(np.median([lasts for _, lasts in cycles])))
     return sorted(found, key=lambda stance: stance.strike)
+
+
+def stance_events(stances: Sequence[Stance]) -> list[FootEvent]:
+    """Strikes and offs of stances in order of time, but for an off after the last frame."""
+    strikes = [FootEvent(each.strike, each.side, True) for each in stances]
+    return sorted([*strikes, *(FootEvent(each.off, each.side, False) for each in stances if np.isfinite(each.off))])
 
 
 def _touched(times: Array, contacts: Contacts, side: str, names: list[str], positions: Array, sd: Array) -> list[Stance]:

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.calibration.agreement import MAX_DISAGREEMENT, Agreement, compare_cameras
+from shadowpuppet.calibration.clock_offset import ClockOffsets
 from shadowpuppet.calibration.rotation_error import RotationError, estimate_place_error, estimate_rotation_error
 from shadowpuppet.calibration.silhouettes import Row, silhouettes_of
-from shadowpuppet.calibration.sound_offset import SoundOffsets
 from shadowpuppet.calibration.time_offset import TimeOffsets, time_offsets
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
 from shadowpuppet.pipeline.footage import Footage, take_sample
@@ -73,10 +73,10 @@ class CalibrationCheck:
     """Values for [start] of recording.toml, seconds; empty if no film is late."""
     turns: dict[str, RotationFix]
     """Rotations that explain the disagreement of cameras, by camera name."""
-    sound: SoundOffsets | None = None
-    """Offsets of the films by their sound; None if fewer than two have sound."""
-    by_sound: bool = False
-    """Whether the films were put in step by their sound before silhouettes were compared."""
+    clock: ClockOffsets | None = None
+    """Offsets of the films by their timecode or sound; None if fewer than two have either."""
+    by_clock: bool = False
+    """Whether the films were put in step by that before silhouettes were compared."""
     doubts: tuple[str, ...] = ()
     """Problems with their remedies, a sentence each."""
 

@@ -1,4 +1,4 @@
-"""Checks a recording: its calibration by silhouettes, and whether its films are in step by silhouettes and by sound."""
+"""Checks a recording: its calibration by silhouettes, and whether its films are in step by silhouettes and by the films' clocks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.calibration.sound_offset import SoundOffsets
+from shadowpuppet.calibration.clock_offset import ClockOffsets
 from shadowpuppet.calibration.time_offset import TimeOffsets
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.pipeline.options import Options
@@ -21,15 +21,17 @@ from shadowpuppet.pipeline.repair.check import (
     gather_silhouettes,
     judge_calibration,
 )
-from shadowpuppet.pipeline.repair.sound import heard_offsets, in_step
+from shadowpuppet.pipeline.repair.clocks import clock_offsets, in_step
 from shadowpuppet.pipeline.rig import Rig
 
+DISAGREE = {"sound": "sound and silhouettes disagree about the films' delays: does the sound of a film lag behind its pictures?",
+            "timecode": "timecodes and silhouettes disagree about the films' delays: were the cameras' clocks set together?"}
 SAME_PIXELS = 0.1
-"""Mean disagreement by which films put in step by sound may be worse if the person hardly moves, so that silhouettes cannot tell."""
+"""Mean disagreement by which films put in step by their clocks may be worse if the person hardly moves, so that silhouettes cannot tell."""
 
 
 def check_calibration(rig: Rig, options: Options, listener: Listener | None = None) -> CalibrationCheck:
-    """Test the calibration of several cameras, and whether their films are in step, by silhouettes and by sound.
+    """Test the calibration of several cameras, and whether their films are in step, by silhouettes and by the films' clocks.
 
     Raises a `ShadowPuppetError` if there are no silhouettes, or no person in them.
     """
@@ -41,7 +43,7 @@ class Checked(NamedTuple):
 
     check: CalibrationCheck
     sets: SilhouetteSets
-    """As the films were compared: put in step by their sound if `check.by_sound`."""
+    """As the films were compared: put in step by their timecode or sound if `check.by_clock`."""
     before: SilhouetteSets
     """As the recording states the films' starts."""
 
@@ -52,29 +54,28 @@ def check_films(rig: Rig, options: Options, listener: Listener | None = None) ->
         raise RecordingError(f"{rig.recording.path}: found one camera, expected two or more")
     listener = listener or Listener()
     sets = gather_silhouettes(rig, options, listener)
-    listener.begin("listening")
-    heard = heard_offsets(rig)
+    listener.begin("reading the films' clocks")
+    clock = clock_offsets(rig)
     listener.begin("comparing")
-    check = replace(judge_calibration(rig, sets), sound=heard)
-    if heard is None or not _differs(heard, check):
+    check = replace(judge_calibration(rig, sets), clock=clock)
+    if clock is None or not _differs(clock, check):
         return Checked(check, sets, sets)
-    moved = in_step(rig, heard.seconds)
+    moved = in_step(rig, clock.seconds)
     again = gather_silhouettes(moved, options, listener)
     listener.begin("comparing")
     other = judge_calibration(moved, again)
     if _mean_disagreement(other) > _mean_disagreement(check) + (SAME_PIXELS if check.still else 0.0):
-        said = "sound and silhouettes disagree about the films' delays: does the sound of a film lag behind its pictures?"
-        return Checked(replace(check, doubts=(*check.doubts, said)), sets, sets)
-    return Checked(_by_sound(rig, moved, other, heard), again, sets)
+        return Checked(replace(check, doubts=(*check.doubts, DISAGREE[clock.by])), sets, sets)
+    return Checked(_by_clock(rig, moved, other, clock), again, sets)
 
 
-def _differs(heard: SoundOffsets, check: CalibrationCheck) -> bool:
-    """Whether sound states an offset that the silhouettes do not."""
-    seen = (None,) * len(heard.names) if check.lateness is None else check.lateness.frames
+def _differs(clock: ClockOffsets, check: CalibrationCheck) -> bool:
+    """Whether the films' clocks state an offset that the silhouettes do not."""
+    seen = (None,) * len(clock.names) if check.lateness is None else check.lateness.frames
     certain = [0.0 if late is None or name not in check.late else late for name, late in zip(check.agreement.names, seen)]
     return any(seconds is not None and spread is not None
                and abs(seconds * check.frame_rate - late) > max(1.0, SPREAD_FACTOR * spread * check.frame_rate)
-               for seconds, spread, late in zip(heard.seconds, heard.spread, certain))
+               for seconds, spread, late in zip(clock.seconds, clock.spread, certain))
 
 
 def _mean_disagreement(check: CalibrationCheck) -> float:
@@ -83,21 +84,21 @@ def _mean_disagreement(check: CalibrationCheck) -> float:
     return float(np.mean(known)) if known else np.inf
 
 
-def _by_sound(rig: Rig, moved: Rig, check: CalibrationCheck, heard: SoundOffsets) -> CalibrationCheck:
-    """The check of films that sound put in step, with delays against the starts that the recording states."""
+def _by_clock(rig: Rig, moved: Rig, check: CalibrationCheck, clock: ClockOffsets) -> CalibrationCheck:
+    """The check of films that their clocks put in step, with delays against the starts that the recording states."""
     names, rate = rig.names, rig.rate
-    late = [(value or 0.0) * rate for value in heard.seconds]
+    late = [(value or 0.0) * rate for value in clock.seconds]
     seen = [None] * len(names) if check.lateness is None else [frames if name in check.late else None
                                                                for name, frames in zip(names, check.lateness.frames)]
     spreads = [None] * len(names) if check.lateness is None else check.lateness.spread
     frames = tuple(round(own + (known or 0.0), 2) for own, known in zip(late, seen))
     spread = tuple((None if width is None else round(width * rate, 2)) if known is None else of_seen
-                   for known, of_seen, width in zip(seen, spreads, heard.spread))
+                   for known, of_seen, width in zip(seen, spreads, clock.spread))
     starts = {footage.camera.name: footage.view.start + (known or 0.0) / rate for footage, known in zip(moved.footage, seen)}
     least = min(starts.values())
     found = TimeOffsets(names=names, frames=frames, spread=spread,
                         pairs=tuple((None,) * len(names) for _ in names) if check.lateness is None else check.lateness.pairs)
-    check = replace(check, lateness=found, sound=heard, by_sound=True,
+    check = replace(check, lateness=found, clock=clock, by_clock=True,
                     late=tuple(name for name, value in zip(names, frames) if abs(value) > MIN_OFFSET),
                     starts={name: round(start - least, 4) for name, start in starts.items() if start - least > 1e-4})
     return replace(check, doubts=tuple(doubts_of(check)))

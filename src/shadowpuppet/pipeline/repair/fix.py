@@ -65,7 +65,7 @@ def _shifts(rig: Rig, checked: Checked) -> list[float]:
     """Sets by which each film is late in the sets compared, of those that are late for certain."""
     found, sets = checked.check, checked.sets
     frames = dict(zip(found.lateness.names, found.lateness.frames)) if found.lateness is not None else {}
-    gone = dict(zip(found.sound.names, found.sound.seconds)) if found.sound is not None and found.by_sound else {}
+    gone = dict(zip(found.clock.names, found.clock.seconds)) if found.clock is not None and found.by_clock else {}
     return [((frames.get(name) or 0.0) - (gone.get(name) or 0.0) * rig.rate) / sets.every if name in found.late else 0.0
             for name in rig.names]
 

@@ -19,8 +19,8 @@ from shadowpuppet.geometry import Array, inverse, rigid, rotation_from_vector, u
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.repair.check import SilhouetteSets, aligned_sets, gather_silhouettes
+from shadowpuppet.pipeline.repair.clocks import clock_offsets, in_step
 from shadowpuppet.pipeline.repair.fix import write_notes
-from shadowpuppet.pipeline.repair.sound import heard_offsets, in_step
 from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 
@@ -101,9 +101,9 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, 
     """The places and directions of cameras with rough places, from the person in their films; focal lengths, too, unless `rough_focal` is 0
     (see `place_by_outlines`).
 
-    Films are put in step first, by their sound and then, as far as the rough places allow, by the silhouettes. The scale is the one at
-    which the person is as tall as `options.height` or the recording's; without, the rough calibration's. Raises `CalibrationError` if too
-    little of the person is seen by two cameras at a time, or a camera's rough place is not known.
+    Films are put in step first, by their timecode or sound and then, as far as the rough places allow, by the silhouettes. The scale is
+    the one at which the person is as tall as `options.height` or the recording's; without, the rough calibration's. Raises
+    `CalibrationError` if too little of the person is seen by two cameras at a time, or a camera's rough place is not known.
     """
     if len(rig.cameras) < 2:
         raise CalibrationError(f"{rig.recording.path}: found one camera, expected two or more: outlines are compared")
@@ -111,9 +111,9 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, 
         if not camera.oriented:
             raise CalibrationError(f"camera {camera.name!r}: found only a field of view, expected also where it stands, roughly")
     listener = listener or Listener()
-    listener.begin("listening")
-    heard = heard_offsets(rig)
-    there = rig if heard is None else in_step(rig, heard.seconds)
+    listener.begin("reading the films' clocks")
+    clock = clock_offsets(rig)
+    there = rig if clock is None else in_step(rig, clock.seconds)
     sets = gather_silhouettes(there, options, listener, whole=True)
     listener.begin("placing the cameras")
     fit, late = placed_in_step(there.cameras, sets, rough_focal)
