@@ -108,8 +108,12 @@ class RigSession(LiveSession):
         return dog.silence(now, "", self.timing.interval) if image is None else dog.see(now, image)
 
     def silence(self, now: float, problem: str) -> str:
-        """The first camera's problem if no set of pictures came; empty if there is none."""
-        return next(filter(None, (dog.silence(now, problem, self.timing.interval) for dog in self.watchdogs)), "")
+        """The first camera's problem if no set of pictures came; empty if there is none, or if enough cameras go on."""
+        interval = self.timing.interval
+        going_on = sum(not dog.silence(now, "", interval) for dog in self.watchdogs)
+        if self.phase == "tracking" and going_on >= LEAST:
+            return ""
+        return next(filter(None, (dog.silence(now, problem, interval) for dog in self.watchdogs)), "")
 
     def asks_again(self, now: float) -> Sequence[int]:
         """Indices of frozen cameras that should be opened again."""
