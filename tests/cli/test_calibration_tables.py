@@ -191,7 +191,7 @@ def test_how_a_live_session_went(printed):
     live = {"latency_ms": {"median": 41.6, "p95": 80.4}, "latency_frames": {"median": 1.234, "p95": 2.0}, "frames_per_s": 24.96,
             "interval_ms": 40.0, "dropped": 3, "breaks": 0}  # fmt: skip
     assert printed(pairs(_live_rows(live))) == [
-        "latency 42 ms from capture to pose (1.23 of a frame's time); 5 % of frames over 80 ms (2.00)",
+        "latency 42 ms from capture to pose (1.23 of a frame's time); p95 80 ms (2.00)",
         "speed 25.0 frames/s of 25.0; 3 dropped"]
     more = printed(pairs(_live_rows(live | {"breaks": 2, "smoothed_latency_ms": {"median": 150.2}})))
     assert more[1] == "smoothed 150 ms from capture, for the display and other programs"

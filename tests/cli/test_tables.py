@@ -29,7 +29,7 @@ def test_the_look_at_a_recording(printed):
         "film 250 frames, 29.97 frames/s, times uneven by 0.4 ms",
         "scale by the height",
         "background a film",
-        "silhouettes 5.1 % of the picture, in 12 frames; by the plain rule of eq. 1 6.0 %",
+        "silhouettes 5.1 % of the picture, in 12 frames; by the fixed threshold of Liu 2011, eq. 1, 6.0 %",
         "exact masks these silhouettes overlap the ready ones by 0.951; those of the plain rule by 0.900",
         "quality area changes by 1.2 % a frame, 0.4 % flickers; 0.2 specks and 1.5 holes a frame; touches left, bottom of the "
         "picture",

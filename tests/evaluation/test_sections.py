@@ -64,7 +64,7 @@ def test_cards():
         ("Depth", "9.1", "mm", "along the camera's axis; 4.6 across it"),
         ("Far off", "1.2", "%", "of joints are over 300 mm off; worst 100 mm"),
         ("Acceleration", "5.2", "m/s²", "the truth's 3.8: more is jitter"),
-        ("Overlap", "0.912", "", "with the silhouettes; 5 % of frames under 0.846"),
+        ("Overlap", "0.912", "", "with the silhouettes; p5 0.846"),
         ("Without a pose", "7", "frames", "11.7 %, the longest 0.33 s"),
     ]
     little = evaluation(humaneva={}, acceleration={}, overlap={"count": 0}, losses={"frames": 0, "share": 0.0, "longest_s": 0.0},

@@ -48,7 +48,7 @@ def _film(look: Look) -> str:
 
 
 def _areas(look: Look) -> str:
-    plain = f"; by the plain rule of eq. 1 {100 * look.plain_area:.1f} %" if look.plain_area is not None else ""
+    plain = f"; by the fixed threshold of Liu 2011, eq. 1, {100 * look.plain_area:.1f} %" if look.plain_area is not None else ""
     return f"{100 * look.area:.1f} % of the picture, in {look.quality.frames} frames{plain}"
 
 

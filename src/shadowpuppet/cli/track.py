@@ -264,7 +264,7 @@ def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
 def _live_rows(live: Mapping[str, Any]) -> list[tuple[str, str | None]]:
     """Rows on the latency, speed and interruptions of a live session."""
     late, frames, smoothed = live["latency_ms"], live["latency_frames"], live.get("smoothed_latency_ms")
-    return [("latency", f"{late['median']:.0f} ms from capture to pose ({frames['median']:.2f} of a frame's time); 5 % of frames over "
+    return [("latency", f"{late['median']:.0f} ms from capture to pose ({frames['median']:.2f} of a frame's time); p95 "
                         f"{late['p95']:.0f} ms ({frames['p95']:.2f})"),
             ("smoothed", f"{smoothed['median']:.0f} ms from capture, for the display and other programs" if smoothed else None),
             ("speed", f"{live['frames_per_s']:.1f} frames/s of {1000 / live['interval_ms']:.1f}; {live['dropped']} dropped"),

@@ -35,7 +35,7 @@ def _cards(of: Evaluation) -> Iterator[tuple[str, str, str, str]]:
             yield "Acceleration", f"{moves['run_m_s2']:.1f}", "m/s²", f"the truth's {moves['truth_m_s2']:.1f}: more is jitter"
     if measured["overlap"]["count"]:
         fit = measured["overlap"]
-        yield "Overlap", f"{fit['mean']:.3f}", "", f"with the silhouettes; 5 % of frames under {fit['p5']:.3f}"
+        yield "Overlap", f"{fit['mean']:.3f}", "", f"with the silhouettes; p5 {fit['p5']:.3f}"
     lost = measured["losses"]
     yield "Without a pose", str(lost["frames"]), "frames", (f"{100 * lost['share']:.1f} %, the longest {lost['longest_s']:.2f} s"
                                                             if lost["frames"] else "none was lost")
