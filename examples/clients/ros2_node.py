@@ -2,9 +2,9 @@
 
     python examples/clients/ros2_node.py [--ros-args -p address:=ws://127.0.0.1:8601 -p frame:=map]
 
-It publishes transforms from the fixed frame to `person/<joint>` on /tf, angles as sensor_msgs/JointState on person/joint_states, and a
-stick figure for RViz as visualization_msgs/MarkerArray on person/markers. Units and axes are REP 103's: metres, radians, right-handed,
-Z up; a joint's frame has X forward, Y left, Z up when the person stands with hanging arms. The fixed frame is the calibration's world (REP
+It publishes transforms from the fixed frame to `person/<joint>` on /tf, of joints that are vouched for; angles as sensor_msgs/JointState on
+person/joint_states; and a stick figure for RViz as visualization_msgs/MarkerArray on person/markers, in which bones that are not vouched
+for are orange. Units and axes are REP 103's: metres, radians, right-handed, Z up; a joint's frame has X forward, Y left, Z up when the person stands with hanging arms. The fixed frame is the calibration's world (REP
 105: name it `map`, or publish its place in `map`). Stamps are the moments at which pictures were captured, on this machine's clock.
 
 It has been tested against a stand-in for rclpy with ROS's message definitions, not in ROS itself.
@@ -21,6 +21,8 @@ from std_msgs.msg import ColorRGBA
 from tf2_ros import TransformBroadcaster
 from visualization_msgs.msg import Marker, MarkerArray
 from websockets.sync.client import connect
+
+SURE, DOUBTFUL = ColorRGBA(r=0.2, g=0.6, b=1.0, a=1.0), ColorRGBA(r=1.0, g=0.6, b=0.1, a=0.5)
 
 
 class Person(Node):
@@ -47,14 +49,18 @@ class Person(Node):
     def publish(self, message):
         stamp = (self.get_clock().now() - Duration(seconds=message["age"] or 0.0)).to_msg()
         points = [Point(x=x, y=y, z=z) for x, y, z in message["joints"]]
-        self.transforms.sendTransform([self.transform(stamp, *each) for each in zip(self.begin["joints"], points, message["rotations"])])
+        sure = [status == "tracked" for status in message["statuses"]]
+        placed = [self.transform(stamp, *each) for each in zip(self.begin["joints"], points, message["rotations"])]
+        self.transforms.sendTransform([each for each, known in zip(placed, sure) if known])
         angles = JointState(name=self.begin["angles"], position=message["angles"])
         angles.header.stamp = stamp
         self.angles.publish(angles)
-        bones = Marker(ns="person", type=Marker.LINE_LIST, action=Marker.ADD, color=ColorRGBA(r=0.2, g=0.6, b=1.0, a=1.0))
+        bones = Marker(ns="person", type=Marker.LINE_LIST, action=Marker.ADD)
         bones.header.stamp, bones.header.frame_id, bones.scale.x, bones.pose.orientation.w = stamp, self.frame, 0.03, 1.0
         bones.lifetime = Duration(seconds=0.5).to_msg()
-        bones.points = [points[end] for n, parent in enumerate(self.begin["parents"]) if parent >= 0 for end in (parent, n)]
+        ends = [(n, end) for n, parent in enumerate(self.begin["parents"]) if parent >= 0 for end in (parent, n)]
+        bones.points = [points[end] for _, end in ends]
+        bones.colors = [SURE if sure[n] else DOUBTFUL for n, _ in ends]
         self.markers.publish(MarkerArray(markers=[bones]))
 
     def transform(self, stamp, joint, point, rotation):

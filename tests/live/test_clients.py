@@ -22,6 +22,7 @@ from shadowpuppet.live.stream.choice import open_outlets
 from shadowpuppet.live.stream.outlet import Outlets, Subject
 from shadowpuppet.live.stream.settings import OutletSettings
 from shadowpuppet.live.stream.websocket import WebSocketOutlet
+from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.motion.motion import MotionFrame
 
 CLIENTS = Path(__file__).resolve().parents[2] / "examples" / "clients"
@@ -118,6 +119,9 @@ def test_the_lsl_client_tells_where_a_hand_is_and_how_old_that_is(who, frame):
 
 
 def test_the_ros_node_publishes_transforms_angles_and_a_stick_figure(who, frame, monkeypatch):
+    """The joints of an arm that is not vouched for have no transform, and another colour."""
+    frame = frame._replace(limb_status=["uncertain" if limb == "left_arm" else "tracked" for limb in LIMBS])
+    doubted = np.array([limb_of(name) == "left_arm" for name in who.names])
     for name, module in stand_in_ros.modules().items():
         monkeypatch.setitem(sys.modules, name, module)
     outlet = WebSocketOutlet("127.0.0.1", 0)
@@ -133,14 +137,14 @@ def test_the_ros_node_publishes_transforms_angles_and_a_stick_figure(who, frame,
     node.join(10)
     assert not node.is_alive()
     told = who.stream_frame(frame)
-    transforms = published["/tf"][: len(who.names)]
-    assert [each.child_frame_id for each in transforms] == [f"person/{name}" for name in who.names]
+    transforms = published["/tf"][: (~doubted).sum()]
+    assert [each.child_frame_id for each in transforms] == [f"person/{name}" for name, doubt in zip(who.names, doubted) if not doubt]
     assert {each.header.frame_id for each in transforms} == {"lab"}
     assert {each.header.stamp.sec + 1e-9 * each.header.stamp.nanosec for each in transforms} == {stand_in_ros.NOW - AGE}
     turns = Rotation.from_quat([[each.transform.rotation.values[axis] for axis in "xyzw"] for each in transforms])
     places = [[each.transform.translation.values[axis] for axis in "xyz"] for each in transforms]
-    np.testing.assert_allclose(places, told.positions, atol=1e-4)
-    np.testing.assert_allclose(turns.as_matrix(), told.rotations, atol=1e-4)
+    np.testing.assert_allclose(places, told.positions[~doubted], atol=1e-4)
+    np.testing.assert_allclose(turns.as_matrix(), told.rotations[~doubted], atol=1e-4)
     angles = published["person/joint_states"][0]
     assert angles.name == list(who.body.skeleton.dof_names)
     np.testing.assert_allclose(angles.position, told.pose, atol=1e-4)
@@ -150,3 +154,5 @@ def test_the_ros_node_publishes_transforms_angles_and_a_stick_figure(who, frame,
     assert (drawn.type, drawn.header.frame_id, drawn.lifetime.nanosec) == (5, "lab", 500_000_000)
     ends = np.array([[point.x, point.y, point.z] for point in drawn.points[:2]])
     np.testing.assert_allclose(ends, told.positions[[who.parents[1], 1]], atol=1e-4)
+    pale = [colour.a < 1 for colour in drawn.colors]
+    assert pale == [doubted[n] for n, parent in enumerate(who.parents) if parent >= 0 for _ in "ab"]

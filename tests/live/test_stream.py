@@ -87,6 +87,14 @@ def test_a_frame_without_a_pose_tells_none(status, pose):
     assert (told.time, told.status, told.pose, told.positions, told.rotations) == (0.5, status, None, None, None)
 
 
+def test_every_joint_has_the_status_of_its_limb_or_of_the_frame():
+    who, whole = subject("anatomical"), posed(subject("anatomical"))
+    assert set(whole.statuses) == {"tracked"}
+    statuses = ("tracked", "uncertain", "tracked", "predicted", "tracked")
+    found = dict(zip(who.names, who.stream_frame(MotionFrame(0.5, "tracked", whole.pose, limb_status=statuses)).statuses))
+    assert [found[name] for name in ("pelvis", "left_wrist", "right_wrist", "left_toe", "right_toe")] == list(statuses)
+
+
 # OSC
 
 
@@ -230,12 +238,14 @@ def test_messages_are_as_the_manual_says(name):
     begin, frame = json.loads(beginning(who)), json.loads(framed(posed(who)))
     for message in (begin, frame, json.loads(framed(who.stream_frame(MotionFrame(0.1, "absent"))))):
         check(message)
-    for spoilt in (begin | {"type": "frame"}, frame | {"joints": [[1, 2]]}, {**frame, "status": "well"}, begin | {"units": {}}):
+    for spoilt in (begin | {"type": "frame"}, frame | {"joints": [[1, 2]]}, {**frame, "status": "well"}, frame | {"statuses": ["well"]},
+                   begin | {"units": {}}):  # fmt: skip
         with pytest.raises(fastjsonschema.JsonSchemaValueException):
             check(spoilt)
     joints = begin["joints"]
     assert len(joints) == len(begin["parents"]) == len(frame["joints"]) == len(frame["rotations"])
     assert len(begin["angles"]) == len(frame["angles"])
+    assert len(joints) == len(frame["statuses"])
     assert all(parent < n for n, parent in enumerate(begin["parents"]))
 
 

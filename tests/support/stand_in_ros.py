@@ -46,7 +46,8 @@ Pose = message("Pose", position=Point, orientation=Quaternion)
 JointState = message("JointState", header=Header, name=list, position=list, velocity=list, effort=list)
 ColorRGBA = message("ColorRGBA", r=float, g=float, b=float, a=float)
 Marker = message("Marker", constants={"ADD": 0, "DELETEALL": 3, "LINE_LIST": 5}, header=Header, ns=str, id=int, type=int, action=int,
-                 pose=Pose, scale=Vector3, color=ColorRGBA, lifetime=message("Duration", sec=int, nanosec=int), points=list)  # fmt: skip
+                 pose=Pose, scale=Vector3, color=ColorRGBA, lifetime=message("Duration", sec=int, nanosec=int), points=list,
+                 colors=list)  # fmt: skip
 MarkerArray = message("MarkerArray", markers=list)
 
 NOW = 1000.0

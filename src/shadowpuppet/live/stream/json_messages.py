@@ -32,7 +32,7 @@ def framed(frame: StreamFrame) -> str:
     return _text({
         "type": "frame", "time": _number(frame.time, 6), "status": frame.status, "overlap": _number(frame.overlap, 4),
         "age": _number(frame.age, 4), "joints": _numbers(frame.positions, 5), "rotations": _numbers(rotations, 6),
-        "angles": _numbers(frame.pose, 5),
+        "angles": _numbers(frame.pose, 5), "statuses": frame.statuses,
     })  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.body_animation import BodyTree
+from shadowpuppet.motion.limbs import limb_of, limbs_of
 from shadowpuppet.motion.motion import BLANK, MotionFrame
 
 
@@ -36,6 +37,8 @@ class StreamFrame(NamedTuple):
     """Joints in the world, (N, 3), metres."""
     rotations: Array | None
     """Joints' rotations from the axes of the zero pose (X forward, Y left, Z up) to the world, (N, 3, 3)."""
+    statuses: tuple[str, ...] | None = None
+    """Of each of the N joints' limbs: `tracked` if it is vouched for, else one of `motion.limbs.DOUBTFUL`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +82,12 @@ class Subject:
         joints = self.body.skeleton.forward(pose[None], self.T_world_base)[0][self._joints]
         rotations = joints[:, :, :3]
         positions = (rotations @ self._offsets)[..., 0] + joints[:, :, 3]
-        return StreamFrame(frame.time, frame.status, frame.overlap, age, pose, positions, rotations)
+        return StreamFrame(frame.time, frame.status, frame.overlap, age, pose, positions, rotations, self._statuses(frame))
+
+    def _statuses(self, frame: MotionFrame) -> tuple[str, ...]:
+        """Status of each joint: of its limb, or of the frame if that states none of limbs."""
+        limbs = dict(zip(limbs_of(self.names), frame.limb_status or ()))
+        return tuple(limbs.get(limb_of(name), frame.status) for name in self.names)
 
     @cached_property
     def _joints(self) -> list[int]:
