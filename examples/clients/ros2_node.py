@@ -4,8 +4,9 @@
 
 It publishes transforms from the fixed frame to `person/<joint>` on /tf, of joints that are vouched for; angles as sensor_msgs/JointState on
 person/joint_states; and a stick figure for RViz as visualization_msgs/MarkerArray on person/markers, in which bones that are not vouched
-for are orange. Units and axes are REP 103's: metres, radians, right-handed, Z up; a joint's frame has X forward, Y left, Z up when the person stands with hanging arms. The fixed frame is the calibration's world (REP
-105: name it `map`, or publish its place in `map`). Stamps are the moments at which pictures were captured, on this machine's clock.
+for are orange. Units and axes are REP 103's: metres, radians, right-handed, Z up; a joint's frame has X forward, Y left, Z up when the
+person stands with hanging arms. The fixed frame is the calibration's world (REP 105: name it `map`, or publish its place in `map`). Stamps
+are the moments at which pictures were captured, on this machine's clock.
 
 It has been tested against a stand-in for rclpy with ROS's message definitions, not in ROS itself.
 """
