@@ -18,7 +18,8 @@ import runs
 
 from shadowpuppet.body.models import WHOLE
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
-from shadowpuppet.io.export import FORMATS, export_run
+from shadowpuppet.io.export import export_run
+from shadowpuppet.io.export_formats import FORMATS
 from shadowpuppet.io.files.table import read_table
 from shadowpuppet.io.motion import EXPORTS
 from shadowpuppet.io.motion.bvh import read_bvh
