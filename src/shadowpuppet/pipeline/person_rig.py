@@ -31,7 +31,7 @@ from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.multiview import Before, MultiviewDoubt
 from shadowpuppet.tracking.doubt.steps import Trail
-from shadowpuppet.tracking.multiview.settings import for_smeared
+from shadowpuppet.tracking.multiview.settings import for_rate, for_smeared
 from shadowpuppet.tracking.multiview.size_estimation import estimate_height, estimate_sizes, size_deviations
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -153,8 +153,8 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
     prior = known.prior if settings.method == "hybrid" else None
     summary: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,
                                "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
-    tracker = MultiviewTracker(person.body, tuple(cameras), settings, prior, library, looks=looks_in(settings.patience, rate),
-                               carve=hull.points if settings.odd_camera else None)
+    tracker = MultiviewTracker(person.body, tuple(cameras), for_rate(settings, rate), prior, library,
+                               looks=looks_in(settings.patience, rate), carve=hull.points if settings.odd_camera else None)
     return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull, tracker=tracker,
                             beside=tuple(_beside(each, picture.mask(person.pose), camera.size)
                                          for each, picture, camera in zip(person.unexplained, tracker.views.pictures, cameras)))
@@ -165,7 +165,7 @@ def average_person(rng: np.random.Generator, cameras: Sequence[Camera], options:
     settings = options.multiview
     known, sizes = familiar(rng, options, None, settings.body, rate), average_sizes(settings.body, height)
     source, prior = "the height alone: not seen apart from other people", known.prior if settings.method == "hybrid" else None
-    tracker = MultiviewTracker(make_body(settings.body, sizes), tuple(cameras), settings, prior,
+    tracker = MultiviewTracker(make_body(settings.body, sizes), tuple(cameras), for_rate(settings, rate), prior,
                                known.poses if len(known.poses) else None, looks=looks_in(settings.patience, rate))
     summary = {"source": source, "sizes": dict(zip(sizes.names(), map(float, sizes.to_array()), strict=True))}
     return MultiviewSubject(body=tracker.body, person=Person(sizes, height, source), summary=summary,

@@ -73,5 +73,5 @@ class Proposals:
     def _moved_on(self, poses: Array, velocity: Array) -> Array:
         """Poses (N, D) with position and heading advanced by the settings' share of `velocity` (D,)."""
         out = poses.copy()
-        out[:, self.root] += self.settings.velocity * velocity[self.root]
+        out[:, self.root] += (self.settings.velocity or 0.0) * velocity[self.root]
         return out

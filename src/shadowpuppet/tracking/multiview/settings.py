@@ -118,8 +118,9 @@ class MultiviewSettings:
     local: Annotated[int, Field(ge=0, le=100)] = 4
     """Rounds of a local search after refinement: single joints of the best pose are turned at random, and what refinement made worse by
     the particles' cost is undone. 0: none."""
-    velocity: Share = 0.0
-    """Share of the last frame's motion of position and heading that is added to proposals, once a frame."""
+    velocity: Share | None = None
+    """Share of the last frame's motion of position and heading that is added to proposals, once a frame. None: all of it where a frame
+    lasts longer than 1/20 s, else nothing."""
     sigma_cost: Positive = 0.003
     """sigma of eq. 29 (m): a pose that costs sigma^2 more than the best weighs 1/e."""
     silhouettes: NonNegative = 0.1
@@ -131,8 +132,8 @@ class MultiviewSettings:
     arms: NonNegative = 1e-4
     """Weight (m^2) of how rare the posture of each arm is among people, in units of a log density. It chooses between places of an arm that
     silhouettes do not tell apart."""
-    cycles: Annotated[int, Field(ge=1, le=100)] = 1
-    """Estimation cycles per frame (annealing)."""
+    cycles: Annotated[int, Field(ge=1, le=100)] | None = None
+    """Estimation cycles per frame (annealing). None: one for each 1/30 s that a frame lasts, at most four."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
     """Factor of the noise from one cycle to the next."""
     estimate: Literal["best", "mean"] = "best"
@@ -151,6 +152,19 @@ class MultiviewSettings:
     """Refinement by simulated forces."""
     hull: HullSettings = HullSettings()
     """How surface points are computed from the silhouettes."""
+
+
+LONG_FRAME, CYCLE_TIME, MOST_CYCLES = 0.05, 1 / 30, 4
+"""Time of a frame, s, from which on proposals take the last frame's motion along; time for which one cycle suffices; most cycles. People
+who walk move by a head's width in a tenth of a second: noise that suffices for 30 frames/s loses them."""
+
+
+def for_rate(settings: MultiviewSettings, rate: float) -> MultiviewSettings:
+    """The settings with what they leave to the frame rate (frames/s)."""
+    seconds = 1 / rate
+    cycles = min(max(round(seconds / CYCLE_TIME), 1), MOST_CYCLES) if settings.cycles is None else settings.cycles
+    velocity = float(seconds > LONG_FRAME) if settings.velocity is None else settings.velocity
+    return replace(settings, cycles=cycles, velocity=velocity)
 
 
 SMEARED_EMPTINESS, SMEARED_SILHOUETTES = 0.25, 0.5
@@ -178,6 +192,7 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "explore": 0.0,
         "local": 0,
         "velocity": 1.0,
+        "cycles": 1,
         "silhouettes": 0.0,
         "posture": 0.0,
         "arms": 0.0,

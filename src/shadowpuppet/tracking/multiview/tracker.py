@@ -148,7 +148,7 @@ class MultiviewTracker:
         # Step 1: the last frame's particles (s, x, w). The state s is the region of the motion prior in which the refined pose x lies:
         # `proposals` finds it. The paper keeps the region drawn before refinement; this lost a whole film (docs/method.md).
         particles = state.particles
-        for cycle in range(s.cycles):
+        for cycle in range(s.cycles or 1):
             # Step 2, selection: draw particles by their weights.
             selected = particles.poses[self.resample(rng, particles.log_weights, self.number)]
             # Step 3, sampling: draw each particle's next state and pose (eqs. 24-28).
