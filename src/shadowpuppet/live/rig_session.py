@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -197,8 +197,9 @@ class RigSession(LiveSession):
 
     def _fitting(self) -> Callable[[], MultiviewSubject | TrackingError]:
         """A task that measures the person in the first seconds; it returns, rather than raises, the error if there is no person."""
-        chosen = evenly_spread(len(self._first), OPENED).tolist()
-        fit = partial(fit_in_views, self.rng.spawn(1)[0], self._worked, [self._first[n][1] for n in chosen], self.options,
+        chosen, settings = evenly_spread(len(self._first), OPENED).tolist(), self.options.multiview
+        in_time = replace(self.options, multiview=replace(settings, cycles=settings.cycles or 1))  # more would take longer than a frame
+        fit = partial(fit_in_views, self.rng.spawn(1)[0], self._worked, [self._first[n][1] for n in chosen], in_time,
                       1 / self.timing.interval, self.height)
 
         def tried() -> MultiviewSubject | TrackingError:

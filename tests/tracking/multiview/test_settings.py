@@ -6,8 +6,10 @@ import pytest
 
 from shadowpuppet.tracking.multiview.settings import MULTIVIEW_PRESETS, for_rate, make_multiview_settings
 
+RATES = [(120, 1, 0), (60, 1, 0), (25, 1, 0), (20, 2, 0), (15, 2, 1), (10, 3, 1), (2, 4, 1)]
 
-@pytest.mark.parametrize(("rate", "cycles", "velocity"), [(120, 1, 0), (60, 1, 0), (25, 1, 0), (20, 2, 0), (15, 2, 1), (10, 3, 1), (2, 4, 1)])
+
+@pytest.mark.parametrize(("rate", "cycles", "velocity"), RATES)
 def test_long_frames_have_more_cycles_and_take_the_motion_along(rate, cycles, velocity):
     found = for_rate(make_multiview_settings(), rate)
     assert (found.cycles, found.velocity) == (cycles, velocity)

@@ -133,7 +133,7 @@ class MultiviewSettings:
     """Weight (m^2) of how rare the posture of each arm is among people, in units of a log density. It chooses between places of an arm that
     silhouettes do not tell apart."""
     cycles: Annotated[int, Field(ge=1, le=100)] | None = None
-    """Estimation cycles per frame (annealing). None: one for each 1/30 s that a frame lasts, at most four."""
+    """Estimation cycles per frame (annealing). None: one for each 1/30 s that a frame lasts, at most four; one when live."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
     """Factor of the noise from one cycle to the next."""
     estimate: Literal["best", "mean"] = "best"
