@@ -41,7 +41,7 @@ EMPTY = 3.0
 PROCESSES = multiprocessing.get_context("spawn")
 """Pictures are sent by a process of their own, as they are by cameras."""
 LATE, HALF, STALLS = 0.15, 2, 2.0
-"""Seconds by which a stream is late; pictures of which it gives one; seconds for which it gives none."""
+"""Delay of a late stream, s; factor by which a slow stream's rate is lower; length of a gap, s."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Faults:
     apart: bool = False
     """Whether the cameras' shutters are evenly spread over the interval instead of together."""
     told: bool = False
-    """Whether `live` is told how late it is."""
+    """Whether the session gets `--delay`."""
 
 
 ROWS = {"clean": Faults(), "shutters apart": Faults(apart=True), f"one {1000 * LATE:.0f} ms late": Faults(late=LATE),
@@ -181,7 +181,7 @@ class Timer(Display):
 
 
 def session(stage: Stage, faults: Faults, seconds: float, truth: JointTable) -> list[float]:
-    """The figures of a session; NaN if nobody was tracked."""
+    """`figures` of one session; NaN without a pose."""
     cameras = [view.camera.resized(stage.size) for view in stage.recording.views]
     stage.apart = 1 / stage.rate / len(cameras) if faults.apart else 0.0
     stage.start, stalled_from, ports = time.monotonic() + 1.0, PROCESSES.Value("d", np.inf), PROCESSES.Queue()

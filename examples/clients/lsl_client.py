@@ -2,7 +2,7 @@
 
     python examples/clients/lsl_client.py [--stream puppet] [--joint left_hand]
 
-Metres in the calibration's world: right-handed, Z up; NaN while nobody is tracked. A sample is stamped with its picture's capture.
+Metres in the calibration's world: right-handed, Z up; NaN without a pose. A sample is stamped with its picture's capture.
 """
 
 import argparse

@@ -22,7 +22,7 @@ bones = {}
 
 
 def show(_, seconds):
-    """The last message of a frame: print the hand, and forget the bones. A frame without bones has nobody."""
+    """Print the hand at the last message of a frame, and start the next one. Without bones the person is lost or absent."""
     place, turn = np.zeros(3), Rotation.identity()
     for bone in filter(bones.get, CHAIN):
         place, turn = place + turn.apply(bones[bone][:3]), turn * Rotation.from_quat(bones[bone][3:])

@@ -27,7 +27,7 @@ from shadowpuppet.motion.motion import MotionFrame
 
 CLIENTS = Path(__file__).resolve().parents[2] / "examples" / "clients"
 AGE = 0.02
-"""Seconds from capture to sending, as told to the outlets."""
+"""Seconds from capture to sending."""
 
 
 @pytest.fixture(scope="module")

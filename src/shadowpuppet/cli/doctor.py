@@ -128,10 +128,8 @@ def _python() -> Iterator[Finding]:
 
 
 def _libraries() -> Iterator[Finding]:
-    wanted = [text for text in metadata.requires("shadowpuppet") or [] if "extra ==" not in text]
     info, bad = [], []
-    for text in wanted:
-        name = re.split(r"[^\w.-]", text, maxsplit=1)[0]
+    for name in _required("shadowpuppet"):
         try:
             import_module(MODULES.get(name, name.replace("-", "_")))
             info.append(f"{name} {metadata.version(name)}")
@@ -156,13 +154,18 @@ def _needed(name: str) -> set[str]:
     while open_ends:
         name = re.sub(r"[-_.]+", "-", open_ends.pop()).lower()
         try:
-            wanted = metadata.requires(name) or []
+            wanted = _required(name)
         except metadata.PackageNotFoundError:  # of another system or Python
             continue
         if name not in found:
             found.add(name)
-            open_ends += [re.split(r"[^\w.-]", text, maxsplit=1)[0] for text in wanted if "extra ==" not in text]
+            open_ends += wanted
     return found
+
+
+def _required(name: str) -> list[str]:
+    """The distributions that one states to need, without extras. Raises `PackageNotFoundError`."""
+    return [re.split(r"[^\w.-]", text, maxsplit=1)[0] for text in metadata.requires(name) or [] if "extra ==" not in text]
 
 
 def _size(name: str) -> int:

@@ -10,10 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shadowpuppet.evaluation.movement.angles import PERCENT
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.movement.gait_curves import STANDING_TILT, WALK, curve
 
-PHASES = np.arange(101) / 100
+PHASES = PERCENT / 100
 """Of the gait cycle."""
 
 
