@@ -38,8 +38,8 @@ from shadowpuppet.synthetic.spec_changes import SpecChanges, apply_changes
 from shadowpuppet.synthetic.spec_file import read_spec
 
 if TYPE_CHECKING:
-    from shadowpuppet.io.external_masks import MadeMasks
     from shadowpuppet.io.humaneva import HumanEva
+    from shadowpuppet.io.masks.segmentation import MadeMasks
     from shadowpuppet.io.recording import Recording
     from shadowpuppet.motion.motion import JointTable
 
@@ -170,8 +170,8 @@ def masks(source: Annotated[Path | None, Parameter(help="Folder with video/, or 
         return _write_new(template, TEMPLATE.read_text("utf-8"))
     if source is None:
         raise SettingsError("masks: found no recording, expected its folder, a film or a folder of pictures; or --list or --template")
-    from shadowpuppet.io.external_masks import make_masks
-    from shadowpuppet.io.masked_recording import check_room, readable_recording
+    from shadowpuppet.io.masks.masked_recording import check_room, readable_recording
+    from shadowpuppet.io.masks.segmentation import make_masks
 
     chosen = find_script(script)
     recording, calibrated = readable_recording(source, calibration)

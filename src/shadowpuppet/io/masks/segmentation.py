@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.io.masked_recording import write_masked_recording
+from shadowpuppet.io.masks.masked_recording import write_masked_recording
 from shadowpuppet.io.recording import Recording, View
 from shadowpuppet.silhouette.external.environment import command_for
 from shadowpuppet.silhouette.external.masks import external_masks

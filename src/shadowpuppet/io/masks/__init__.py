@@ -1,0 +1,1 @@
+"""Recordings whose silhouettes another program made."""
