@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 from scipy.signal import ShortTimeFFT, windows
 
-from shadowpuppet.calibration.clock_offset import ClockOffsets
+from shadowpuppet.calibration.clock_offset import ClockOffsets, PairOffset, offsets_of_pairs
 from shadowpuppet.geometry import Array
 
 RATE = 8000
@@ -37,8 +37,6 @@ MOMENT, CONFIRMED = 0.3, 5.0
 """Half the length (s) of a moment, with its echoes; and robust standard deviations by which the likeness without the moment that counts
 most must still exceed the median of all shifts: 0 to 2 where nothing else is shared, 8 and more where something is."""
 SPEED_OF_SOUND = 343.0
-QUANTILE = 1.645
-"""Half-width of a 90 % interval over the standard deviation."""
 PRECISION = 0.002
 """Standard deviation of an offset without echoes, seconds."""
 
@@ -59,10 +57,9 @@ def sound_offsets(names: Sequence[str], sounds: Sequence[Array | NDArray[np.floa
         first, second = onsets[i], onsets[j]
         shift = None if first is None or second is None else best_shift(first, second)
         if shift is not None:
-            way = float(np.linalg.norm(centres[i] - centres[j])) / SPEED_OF_SOUND
-            pairs.append((i, j, shift + begins[j] - begins[i], way))
-    seconds, spread = _solved(len(names), pairs)
-    return ClockOffsets(by="sound", names=tuple(names), seconds=seconds, spread=spread)
+            way = float(np.linalg.norm(centres[i] - centres[j])) / SPEED_OF_SOUND / np.sqrt(3)  # it comes from anywhere between the two
+            pairs.append(PairOffset(i, j, shift + begins[j] - begins[i], float(np.hypot(PRECISION, way))))
+    return offsets_of_pairs("sound", names, pairs)
 
 
 def onset_strengths(samples: Array | NDArray[np.float32]) -> Array:
@@ -126,28 +123,3 @@ def _summit(values: Array, k: int) -> float:
     before, at, after = values[k - 1 : k + 2]
     bend = before - 2 * at + after
     return float(0.5 * (before - after) / bend) if bend < 0 else 0.0
-
-
-def _solved(count: int, pairs: Sequence[tuple[int, int, float, float]]) -> tuple[tuple[float | None, ...], tuple[float | None, ...]]:
-    """Offsets with a median of zero from those of pairs (first, second, seconds, the sound's way in seconds), and their half-widths."""
-    heard = sorted({camera for i, j, *_ in pairs for camera in (i, j)})
-    if not heard:
-        return (None,) * count, (None,) * count
-    rows, target = np.zeros((len(pairs), count)), np.array([shift for _, _, shift, _ in pairs])
-    for n, (i, j, *_) in enumerate(pairs):
-        rows[n, i], rows[n, j] = -1, 1
-    weights = np.ones(len(pairs))
-    late = np.zeros(count)
-    for _ in range(20):  # iteratively reweighted least squares: the sum of absolute residuals
-        late = np.linalg.lstsq(rows * weights[:, None], target * weights, rcond=None)[0]
-        weights = 1 / np.sqrt(np.maximum(np.abs(rows @ late - target), PRECISION))
-    late -= np.median(late[heard])
-    off = np.abs(rows @ late - target)
-    seconds: list[float | None] = [None] * count
-    spread: list[float | None] = [None] * count
-    for camera in heard:
-        own = [n for n, (i, j, *_) in enumerate(pairs) if camera in (i, j)]
-        way = float(np.median([pairs[n][3] for n in own])) / np.sqrt(3)  # the sound comes from anywhere between the two
-        seconds[camera] = round(float(late[camera]), 4)
-        spread[camera] = round(QUANTILE * float(np.sqrt(PRECISION**2 + way**2 + np.median(off[own]) ** 2)), 4)
-    return tuple(seconds), tuple(spread)

@@ -25,7 +25,8 @@ from shadowpuppet.pipeline.repair.clocks import clock_offsets, in_step
 from shadowpuppet.pipeline.rig import Rig
 
 DISAGREE = {"sound": "sound and silhouettes disagree about the films' delays: does the sound of a film lag behind its pictures?",
-            "timecode": "timecodes and silhouettes disagree about the films' delays: were the cameras' clocks set together?"}
+            "timecode": "timecodes and silhouettes disagree about the films' delays: were the cameras' clocks set together?",
+            "flashes": "flashes and silhouettes disagree about the films' delays: did each camera see a flash of its own?"}
 SAME_PIXELS = 0.1
 """Mean disagreement by which films put in step by their clocks may be worse if the person hardly moves, so that silhouettes cannot tell."""
 
@@ -43,7 +44,7 @@ class Checked(NamedTuple):
 
     check: CalibrationCheck
     sets: SilhouetteSets
-    """As the films were compared: put in step by their timecode or sound if `check.by_clock`."""
+    """As the films were compared: put in step by their clocks if `check.by_clock`."""
     before: SilhouetteSets
     """As the recording states the films' starts."""
 
