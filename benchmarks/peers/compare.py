@@ -5,8 +5,8 @@
 Shared recordings, made ones of several cameras and made ones with faults (both made in build/ where they are missing). MediaPipe runs in
 the environment of `shadowpuppet masks --with mediapipe`, which is made where it is missing; its landmarks of several cameras are
 triangulated and smoothed (`triangulation.py`). This program runs with its defaults and the seed 0: as the recording lies, and once more
-without what it is told of the person's postures (reference pictures, training motion). Landmarks and measures stay in build/peers: what is
-there is not run again, unless `--again`; the tables are made of all that is there (`--tables`: nothing else). Half an hour on one core.
+without reference pictures and training motion. Landmarks and measures are kept in build/peers and not made again, unless `--again`; the
+tables show all that is there (`--tables`: only print them). Half an hour on one core.
 """
 
 from __future__ import annotations

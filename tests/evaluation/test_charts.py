@@ -12,8 +12,9 @@ from measured import NAMES, TRUTH, moved, run_that_errs, write_run
 
 from shadowpuppet.evaluation.error_metrics import aligned_distances, hinge_angles
 from shadowpuppet.evaluation.evaluation import Evaluation, measure_run
-from shadowpuppet.evaluation.report import charts
-from shadowpuppet.evaluation.report.charts import BLUE, GREEN, PINK, STATUSES
+from shadowpuppet.evaluation.report import angle_charts, charts
+from shadowpuppet.evaluation.report.charts import STATUSES
+from shadowpuppet.evaluation.report.drawing import BLUE, GREEN, PINK, span
 from shadowpuppet.io.intervals import HALF_WIDTH
 from shadowpuppet.io.motion.table import write_joints
 
@@ -21,7 +22,8 @@ from shadowpuppet.io.motion.table import write_joints
 @pytest.fixture
 def drawn(monkeypatch):
     """The functions return their figures instead of SVG."""
-    monkeypatch.setattr(charts, "_svg", lambda figure, name: figure)
+    for each in (angle_charts, charts):
+        monkeypatch.setattr(each, "svg", lambda figure, name: figure)
 
 
 @pytest.fixture
@@ -167,7 +169,7 @@ def test_overlap_and_cost(tmp_path, drawn, several, scale, unit):
 
 
 def test_differences_of_bends_with_their_mean_and_limits(of, drawn):
-    figure = charts.bland_altman(of)
+    figure = angle_charts.bland_altman(of)
     elbow = next(axes for axes in figure.axes if axes.get_title(loc="left") == "elbow")
     points, mean, low, high = (line for line in elbow.lines if line.get_color() == GREEN)
     angles = hinge_angles(of.table, of.truth)["left_elbow"]
@@ -183,7 +185,7 @@ def test_angles_with_their_intervals(tmp_path, drawn):
     deviations = np.random.default_rng(0).uniform(0.01, 0.1, of.run.motion.poses.shape)
     deviations[3] = np.nan
     of = replace(of, run=replace(of.run, motion=replace(of.run.motion, pose_sd=deviations)))
-    figure = charts.angles_over_time(of)
+    figure = angle_charts.angles_over_time(of)
     panels = {axes.get_title(loc="left"): axes for axes in figure.axes if axes.axison}
     motion = of.run.motion
     axes = panels["elbow flexion"]
@@ -212,8 +214,8 @@ def test_found_against_stated_coverage(drawn):
 
 
 def test_one_frame_has_a_span_too():
-    assert charts._span(np.array([3.0])) == (2.5, 3.5)
-    assert charts._span(np.array([3.0, 5.0]), np.array([1.0])) == (1, 5)
+    assert span(np.array([3.0])) == (2.5, 3.5)
+    assert span(np.array([3.0, 5.0]), np.array([1.0])) == (1, 5)
 
 
 def test_plots_have_no_ground_of_their_own_and_scale_with_the_page(of):

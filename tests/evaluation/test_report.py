@@ -19,7 +19,9 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import app as cli
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.evaluation import Comparison, measure_run
-from shadowpuppet.evaluation.report.charts import POINTS, _binned, by_joint_and_time, fit_over_time
+from shadowpuppet.evaluation.report import angle_charts, charts
+from shadowpuppet.evaluation.report.charts import by_joint_and_time, fit_over_time
+from shadowpuppet.evaluation.report.drawing import POINTS, binned
 from shadowpuppet.evaluation.report.page import page, write_report
 from shadowpuppet.evaluation.report.pictures import _side_by_side, draw_bones, pictures, report_frames
 from shadowpuppet.geometry import rigid
@@ -75,9 +77,9 @@ def images(text: str) -> list[np.ndarray]:
 @pytest.fixture
 def quick(monkeypatch):
     """Pages without their plots, where those are not what is tested."""
-    for name in ("over_time", "by_joint_and_time", "by_joint", "shares", "path_of", "jitter_by_joint", "fit_over_time", "coverage_chart",
-                 "bland_altman"):
-        monkeypatch.setattr(f"shadowpuppet.evaluation.report.charts.{name}", lambda *_: "<svg></svg>")
+    for name in ("over_time", "by_joint_and_time", "by_joint", "shares", "path_of", "jitter_by_joint", "fit_over_time", "coverage_chart"):
+        monkeypatch.setattr(charts, name, lambda *_: "<svg></svg>")
+    monkeypatch.setattr(angle_charts, "bland_altman", lambda *_: "<svg></svg>")
 
 
 # The page as a whole
@@ -235,7 +237,7 @@ def test_a_curve_of_many_frames_is_drawn_as_means_of_neighbours():
     times = np.arange(3.0 * POINTS)
     gaps = np.where(np.arange(len(times)) % 3 == 1, np.nan, times)
     gaps[:3] = np.nan
-    middle, known = _binned(times, [gaps])
+    middle, known = binned(times, [gaps])
     np.testing.assert_allclose(middle, 3 * np.arange(POINTS) + 1)
     np.testing.assert_allclose(known, [np.nan, *middle[1:]])
 

@@ -9,7 +9,7 @@ import numpy as np
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.evaluation.movement.gait_figures import Figure, Spread
 from shadowpuppet.evaluation.movement.movement import Movement, left_out_text
-from shadowpuppet.evaluation.report import charts
+from shadowpuppet.evaluation.report import angle_charts
 from shadowpuppet.evaluation.report.html import figure, plain, rows, table
 from shadowpuppet.motion.contact.steps import Gait
 
@@ -37,7 +37,7 @@ def _gait(movement: Movement) -> Iterator[str]:
     yield ("<p class=said>Mean and standard deviation over the steps or strides. 90 %: half the interval by the run's own statement, which "
            "more steps do not make narrower; the error of times is not stated. Left to right: left less right over their mean.</p>")
     if shown := [each for each in movement.cycles if not each.name.startswith(HIDDEN)]:
-        chart = charts.gait_cycle(shown, movement.normal, _stance(gait))
+        chart = angle_charts.gait_cycle(shown, movement.normal, _stance(gait))
         yield f"<h3>Angles over the gait cycle, degrees</h3>{figure(chart, _note(movement))}"
 
 

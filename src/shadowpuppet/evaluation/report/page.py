@@ -12,7 +12,7 @@ from shadowpuppet.evaluation.error_metrics import aligned_distances
 from shadowpuppet.evaluation.evaluation import Evaluation, check_output
 from shadowpuppet.evaluation.interval_coverage import LEVELS
 from shadowpuppet.evaluation.movement.movement import movement_of
-from shadowpuppet.evaluation.report import charts
+from shadowpuppet.evaluation.report import angle_charts, charts
 from shadowpuppet.evaluation.report.html import document, figure, plain, rows, scrolled, table
 from shadowpuppet.evaluation.report.movement_section import movement_section
 from shadowpuppet.evaluation.report.pictures import ReportFrame, pictures, report_frames
@@ -68,7 +68,7 @@ def _parts(of: Evaluation, name: str) -> Iterator[str]:
         if of.measured["bends_deg"]:
             note = ("Bland and Altman's plot of the bends: is the difference from the truth the same at every angle? Lines: its mean, and "
                     "1.96 standard deviations on both sides.")
-            yield figure(charts.bland_altman(of), note)
+            yield figure(angle_charts.bland_altman(of), note)
     if len(of.run.motion) and any(dof_unit(name) == "rad" for name in of.run.motion.dof_names):
         yield _angles(of)
         yield movement_section(movement_of(of.run))
@@ -83,7 +83,7 @@ def _angles(of: Evaluation) -> str:
     note = ("Degrees, as in angles.csv (there in radians); x, y and z are the components of a rotation vector about the axes forward, left "
             "and up. Bands hold 90 % by the run's own statement: a wide one is an angle that the "
             "silhouettes hardly show. A gap is a frame without a pose.")
-    return f"<h2>Angles</h2>{figure(charts.angles_over_time(of), note)}"
+    return f"<h2>Angles</h2>{figure(angle_charts.angles_over_time(of), note)}"
 
 
 def _silhouettes(of: Evaluation) -> str:
