@@ -46,19 +46,18 @@ def clock_offsets(rig: Rig) -> ClockOffsets | None:
 
 def seen_offsets(rig: Rig) -> ClockOffsets:
     """Offsets of the films by flashes in their first seconds, beside the starts that the recording states."""
-    with ThreadPoolExecutor(usable_cores(), "light") as pool:
+    with warnings.catch_warnings(), ThreadPoolExecutor(usable_cores(), "light") as pool:
+        warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when a run comes to it
         return flash_offsets(rig.names, list(pool.map(_light_of, rig.footage)))
 
 
 def _light_of(footage: Footage) -> Light:
     times, parts = list[float](), list[NDArray[np.float64]]()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when a run comes to it
-        for time, image in open_frames(footage.view.video, grey=True, size=LIGHT_SIZE, rate=footage.recording.rate):
-            if time > LIGHT_READ:
-                break
-            times.append(time - footage.view.start)
-            parts.append(image.astype(float).ravel())
+    for time, image in open_frames(footage.view.video, grey=True, size=LIGHT_SIZE, rate=footage.recording.rate):
+        if time > LIGHT_READ:
+            break
+        times.append(time - footage.view.start)
+        parts.append(image.astype(float).ravel())
     return Light(np.array(times), np.array(parts))
 
 
