@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shadowpuppet.errors import LONGEST, FormatError, ShadowPuppetWarning, one_line, warn
+from shadowpuppet.errors import LONGEST, FormatError, ShadowPuppetWarning, extra_command, one_line, warn
 from shadowpuppet.live.sources import known_person
 from shadowpuppet.pipeline.options import Options
 
@@ -29,6 +33,16 @@ def test_the_middle_of_a_long_message_is_left_out():
     assert len(line) < LONGEST + 10
     assert line.startswith("aaa")
     assert line.endswith("b")
+
+
+@pytest.mark.parametrize(("found", "command"), [
+    (Path(sys.executable).with_name("pip"), "pip install 'shadowpuppet[view]'"),
+    ("/usr/bin/pip", f"{shlex.quote(sys.executable)} -m pip install 'shadowpuppet[view]'"),
+    (None, f"{shlex.quote(sys.executable)} -m pip install 'shadowpuppet[view]'"),
+])  # fmt: skip
+def test_an_extra_is_installed_where_the_program_runs(monkeypatch, found, command):
+    monkeypatch.setattr("shutil.which", lambda name: found and str(found))
+    assert extra_command("view") == command
 
 
 def test_a_warning_names_the_caller_s_line():

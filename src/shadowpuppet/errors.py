@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import shlex
 import stat
 import sys
 import warnings
@@ -96,6 +97,15 @@ class Caution(str):
 def choices(names: Iterable[str]) -> str:
     """Valid names for a message: `a, b, c`."""
     return ", ".join(sorted(names)) or "none"
+
+
+def extra_command(extra: str) -> str:
+    """The command that installs an extra of this package where it runs: a plain pip may be another environment's."""
+    from shutil import which
+
+    ours, found = Path(sys.executable), which("pip")
+    pip = "pip" if found and Path(found).parent == ours.parent else f"{shlex.quote(str(ours))} -m pip"
+    return f"{pip} install 'shadowpuppet[{extra}]'"
 
 
 def shown(value: object) -> str:

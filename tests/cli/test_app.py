@@ -14,6 +14,7 @@ import sys
 import time
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import made
 import numpy as np
@@ -91,6 +92,12 @@ def test_a_look_loads_nothing_that_only_other_commands_need():
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
+def test_progress_goes_on_while_the_compiler_is_being_imported(monkeypatch):
+    """That takes seconds on a busy machine, in which another thread prints."""
+    monkeypatch.setitem(sys.modules, "shadowpuppet.jit", SimpleNamespace())
+    assert terminal_module._compiling() == ""
+
+
 def test_the_version_is_reported_by_the_module_too():
     child = process("--version")
     out, err = child.communicate()
@@ -100,6 +107,7 @@ def test_the_version_is_reported_by_the_module_too():
 
 @pytest.mark.parametrize(("tokens", "said"), [
     (["trac"], 'Unknown command "trac"'),
+    (["track", "my", "film.mp4"], "found 'film.mp4' after all that the command takes; a path with blanks belongs in quotes"),
     (["track"], "requires an argument"),
     (["track", "here", "--overlya"], "Unknown option: --overlya. Did you mean --overlay"),
     (["track", "here", "--tracker.arm.particle", "3"], "Did you mean --tracker.arm.particles"),
@@ -239,7 +247,7 @@ def test_plain_masks_are_tracked_though_they_show_no_posture(shell, recording, t
     assert "Traceback" not in err
     assert err.splitlines()[-1].startswith("the person is lost: person lost in ")
     said = " ".join(out.split())
-    assert "key averaging: as set" in said
+    assert "told by averaging: as set" in said
     assert "all this in clean silhouettes by both: plain ones show no posture" in said
     assert read_run(tmp_path / "plain").info["settings"]["silhouette"]["method"] == "averaging"
 
@@ -312,7 +320,7 @@ def test_a_run_can_be_made_again_from_its_own_file(shell, recording, run, tmp_pa
 
 
 @pytest.mark.parametrize(("text", "said"), [
-    ("particles = 3", "mine.toml: unknown setting 'particles'; there are: anyway, background, body"),
+    ("particles = 3", "mine.toml: unknown setting 'particles'; there are: anyway, appearance, background, body"),
     ("[tracker]\narms = 3", "mine.toml: tracker: unknown setting 'arms'; there are: arm, body"),
     ("[tracker.arm]\nparticles = -3", "mine.toml: tracker: arm.particles: found -3"),
     ("seed = ", "mine.toml: not valid TOML"),
@@ -486,6 +494,8 @@ def test_an_earlier_run_is_replaced_only_if_asked_to(shell, recording, run, monk
     info = tmp_path / "run" / "run.toml"
     info.write_text(info.read_text().replace("complete = true", "complete = false"))
     assert "run: found a run that was broken off, expected --resume" in refused(shell, "track", recording, "-o", "run")
+    said = "run: found a run that was broken off, expected --force, which replaces it, or another folder"
+    assert said in refused(shell, "live", "no.mp4", "-o", "run")  # before the camera is opened
 
     monkeypatch.setattr("shadowpuppet.pipeline.track.track_recording", lambda *_, resume, **__: 1 / 0)
     for answer in ("y\n", "n\n", ""):

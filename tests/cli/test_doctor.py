@@ -13,6 +13,7 @@ import pytest
 from shadowpuppet.cli import app as cli
 from shadowpuppet.cli import doctor
 from shadowpuppet.cli.doctor import Finding, examine, works
+from shadowpuppet.errors import extra_command
 
 
 @pytest.fixture
@@ -140,7 +141,7 @@ def test_what_is_not_there_is_reported_with_what_would_bring_it(monkeypatch):
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
     found = examine()
     assert works(found)
-    assert named(found)["extra view"].remedy == "pip install 'shadowpuppet[view]'"
+    assert named(found)["extra view"].remedy == extra_command("view")
     assert named(found)["codecs"].told == "H.264 can be read; not Nonsense"
     assert "NUMBA_CACHE_DIR" in named(found)["compiled code"].remedy
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from types import SimpleNamespace
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from shadowpuppet.cli import batch_terminal
 from shadowpuppet.cli.batch_terminal import LINES, BatchTerminal, _clock, _pace
 from shadowpuppet.cli.look_tables import _camera_table, _film, _quality, _rig_person, _rig_table
-from shadowpuppet.cli.tables import error_table, files_in, metrics_table, people_table, verdict_table
+from shadowpuppet.cli.tables import error_table, files_in, metrics_table, people_table, show_next, typed, verdict_table
 from shadowpuppet.cli.terminal import Terminal
 
 QUALITY = SimpleNamespace(frames=12, area=0.0512, area_change=0.0123, flicker=0.0045, specks=0.25, holes=1.5,
@@ -40,7 +41,7 @@ def test_the_look_at_a_recording(printed):
                      "refusal": "no", "person": PERSON | {"source": "height", "silhouettes": "hand"}}  # fmt: skip
     found = printed(_camera_table(SimpleNamespace(**little)))
     assert found[1] == "camera cam, 640 x 480 pixels, 60 degrees wide, not calibrated"
-    assert found[4:7] == ["background a film", "key colour: more", "silhouettes 5.1 % of the picture, in 12 frames"]
+    assert found[4:7] == ["background a film", "told by colour: more", "silhouettes 5.1 % of the picture, in 12 frames"]
     assert " ".join(found[7:]) == ("person height 1.76 m at 2.50 m; sizes from height; overlaps the film's first silhouette by 0.88; all "
                                    "this in clean silhouettes by hand: plain ones show no posture")
     assert _film(SimpleNamespace(frames=None, rate=float("inf"), jitter=0.0)) == "frames not counted, rate unknown"
@@ -61,7 +62,7 @@ def test_the_look_at_several_cameras(printed):
         "camera pixels wide stands at, m person exact apart",
         "a 640 x 480 46° 1.0 -2.2 1.5 5.1 %",
         "b 640 x 480, as 320 x 240 46° 1.0 -2.2 1.5 5.1 % 0.950 1.2 px", "",
-        "background background/<camera>.mp4", "keys colour", "seen 1.80 m from end to end, with hair, shoes and what is held up",
+        "background background/<camera>.mp4", "told by colour", "seen 1.80 m from end to end, with hair, shoes and what is held up",
         "person sizes from training; overlaps the first silhouettes by 0.91; 12 mm from their hulls",
     ]  # fmt: skip
     look.cameras[1].exact_overlap, look.person, look.agreement.height, look.frames = None, None, None, None
@@ -69,7 +70,7 @@ def test_the_look_at_several_cameras(printed):
     assert found[1] == "cameras 2, sets not counted of pictures in step, 25 a second"
     assert found[3] == "camera pixels wide stands at, m person apart"
     assert found[5] == "b 640 x 480, as 320 x 240 46° 1.0 -2.2 1.5 5.1 % 1.2 px"
-    assert found[-1] == "keys colour"
+    assert found[-1] == "told by colour"
     assert _rig_person({}) == "measured"
 
 
@@ -143,6 +144,13 @@ def test_clocks(seconds, said):
     assert _clock(seconds) == said
 
 
+def test_commands_to_go_on_with_can_be_pasted(capsys, monkeypatch):
+    monkeypatch.setenv("SHADOWPUPPET_COMMAND", "./run shadowpuppet")
+    show_next(typed("info", "Über mich/mein Raum"), typed("track", "a" * 90, "--overlay"))
+    assert capsys.readouterr().out.splitlines() == [
+        "", "next", "  ./run shadowpuppet info 'Über mich/mein Raum'", f"  ./run shadowpuppet track {'a' * 90} --overlay"]
+
+
 def task(name):
     return SimpleNamespace(name=name, label=f"{name} drs 0")
 
@@ -155,7 +163,8 @@ def batch(monkeypatch, capsys):
     made = BatchTerminal(Terminal())
     made.begin(10, 2)
     now[0] = 150.0
-    return made
+    yield made
+    made.stop()
 
 
 def test_a_batch_counts(batch, capsys):
@@ -166,8 +175,25 @@ def test_a_batch_counts(batch, capsys):
     assert (batch.done, batch.failed) == (1, 1)
     assert batch._counts() == "3 of 10 runs done, 1 failed  1.2 runs/min, 0:05:00 left"
     said = capsys.readouterr().err.splitlines()
-    assert said == ["2 of 10 runs are done already", "3 of 10 runs done  0.6 runs/min, 0:11:40 left",
-                    "warning: b drs 0: no film; it is tried again", "warning: b: failed: no film"]  # a line every 30 s
+    assert said == ["2 of 10 runs are done already", "warning: b drs 0: no film; it is tried again", "warning: b: failed: no film"]
+
+
+def test_without_a_screen_a_batch_says_in_lines_what_it_does(batch):
+    assert batch._line() == "2 of 10 runs done"
+    for n in range(4):
+        batch.working(n, task(f"film{n}"), "tracking", 5, 60)
+    assert batch._line() == "2 of 10 runs done; film0 drs 0: tracking 5/60; film1 drs 0: tracking 5/60; 2 more"
+
+
+def test_the_lines_begin_and_end_with_the_batch(monkeypatch, capsys):
+    monkeypatch.setattr(batch_terminal, "LOG_EVERY", 0.001)
+    monkeypatch.setattr(batch_terminal, "PAUSE", 0.001)
+    told, said = BatchTerminal(Terminal()), threading.Event()
+    monkeypatch.setattr(told._terminal.console, "print", lambda *_, **__: said.set())
+    told.begin(3, 0)
+    assert said.wait(10)
+    told.stop()
+    assert told._log._end is None
 
 
 def test_workers_are_shown(batch, printed):

@@ -123,6 +123,7 @@ def test_who_takes_no_stride_is_told_why(tmp_path, body, why):
     assert not found.figures
     assert not found.cycles
     assert why in found.no_gait
+    assert "0 of" not in found.no_gait
     section = movement_section(found)
     assert found.no_gait[1:].replace("'", "&#x27;") in section
     assert "elbow flex" in section

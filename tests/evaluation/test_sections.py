@@ -145,7 +145,7 @@ def test_coverage(rms, verdict):
 def test_words():
     assert [overlap_sense(share) for share in (0.85, 0.849, 0.7, 0.699)] == ["good", "fair", "fair", "poor"]
     assert root_text({"root_joint": "pelvis"}) == "pelvis"
-    assert losses_text({"frames": 0}) == "no frame"
+    assert losses_text({"frames": 0}) is None
     assert world_text(MEASURED["world"]).endswith("500 mm off")
     found = MEASURED["clock"] | {"speed_error_m_s": 0.123, "speed_error_before_m_s": 0.5}
     rates = "run 25, truth 59.94 frames/s, compared at 60 times"

@@ -17,7 +17,7 @@ import pytest
 import runs
 
 from shadowpuppet.body.models import WHOLE
-from shadowpuppet.errors import FormatError, ShadowPuppetWarning
+from shadowpuppet.errors import FormatError, ShadowPuppetWarning, extra_command
 from shadowpuppet.io.export import export_run
 from shadowpuppet.io.export_formats import FORMATS
 from shadowpuppet.io.files.table import read_table
@@ -148,7 +148,7 @@ def test_a_killed_run_is_exported_as_far_as_it_came(shell, whole, tmp_path):
 def test_without_pyarrow_all_others_are_written(shell, whole, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     code, _, err = shell("export", whole, "--to", "all", "-o", tmp_path / "out")
-    assert (code, err.splitlines()[0]) == (0, "warning: parquet is left out: it needs pyarrow; pip install 'shadowpuppet[formats]'")
+    assert (code, err.splitlines()[0]) == (0, f"warning: parquet is left out: it needs pyarrow; {extra_command('formats')}")
     assert {path.suffix[1:] for path in (tmp_path / "out").iterdir()} == set(EXPORTS) - {"parquet"}
     assert "Parquet needs pyarrow" in refused(shell, "export", whole, "--to", "parquet", "-o", tmp_path / "out")
 
@@ -160,6 +160,15 @@ def test_the_model_and_the_weight_are_chosen(shell, whole, tmp_path):
     text = (tmp_path / "gait2392" / "walk.osim").read_text()
     assert sum(map(float, re.findall(r"<mass>(.*)</mass>", text))) == pytest.approx(70, abs=1e-5)
     assert "weight: found 0.5, expected kilograms from 1 to 500" in refused(shell, "export", whole, "--to", "osim", "--weight", "0.5")
+
+
+def test_a_model_comes_with_its_own_motion(shell, whole, tmp_path):
+    assert shell("export", whole, "--to", "osim,mot", "-o", tmp_path)[0] == 0
+    coordinates = set(re.findall(r'<Coordinate name="(\w+)"', (tmp_path / "walk.osim").read_text()))
+    own = set(read_mot(tmp_path / "walk.mot").values)
+    assert own <= coordinates
+    assert shell("export", whole, "--to", "mot", "-o", tmp_path / "alone")[0] == 0
+    assert own - set(read_mot(tmp_path / "alone" / "walk.mot").values) >= {"neck_flexion", "subtalar_angle_l"}  # Rajagopal's has no neck
 
 
 def test_units_of_bvh(shell, whole, tmp_path):
@@ -340,7 +349,7 @@ def test_what_cannot_be_converted_is_said(shell, whole, tmp_path, monkeypatch):
     assert "needs a skeleton, and none can be fitted" in refused(shell, "convert", "arm.csv", "b.bvh")
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     said = refused(shell, "convert", "a.csv", "b.parquet")
-    assert "Parquet needs pyarrow, which is not installed: pip install 'shadowpuppet[formats]'" in said
+    assert "Parquet needs pyarrow, which is not installed: " in said
     assert not (tmp_path / "b.parquet").exists()
 
 

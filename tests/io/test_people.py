@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io.people import PEOPLE, person_folder, person_folders, read_places, write_header, write_place
+from shadowpuppet.io.people import PEOPLE, open_places, person_folder, person_folders, read_places, write_place
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import RunWriter
 
@@ -17,8 +17,7 @@ def two_people(folder):
     """A run of two people without frames."""
     with RunWriter(folder, "anatomical", DOFS, JOINTS, {}) as writer:
         writer.hand_over()
-        with (folder / PEOPLE).open("wb") as file:
-            write_header(file)
+        with open_places(folder) as file:
             for n in range(3):
                 for person in (1, 2):
                     gone = person == 2 and n == 2
@@ -39,6 +38,16 @@ def test_places_are_read_as_they_were_written(tmp_path):
     assert status == ["tracked", "tracked", "absent"]
     assert where[1].tolist() == [1, 2]
     assert np.isnan(where[2]).all()
+
+
+def test_places_go_on_after_those_that_are_kept(tmp_path):
+    whole = (two_people(tmp_path / "run") / PEOPLE).read_bytes()
+    size = whole.index(b"\n", 40) + 1
+    with open_places(tmp_path / "run", size) as file:
+        file.write(whole[size:])
+    assert (tmp_path / "run" / PEOPLE).read_bytes() == whole
+    with pytest.raises(FormatError, match=r"people\.csv: found fewer lines than the checkpoint"):
+        open_places(tmp_path / "run", len(whole) + 1)
 
 
 def test_a_run_of_several_people_names_its_folders(tmp_path):

@@ -381,7 +381,7 @@ def test_regions_outside_the_film_are_said(recording, region, said):
 
 
 @pytest.mark.parametrize(("values", "said"), [
-    ({"sed": 1}, r"unknown setting 'sed'; there are: anyway, background, .*seed"),
+    ({"sed": 1}, r"unknown setting 'sed'; there are: anyway, appearance, background, .*seed"),
     ({"tracker": {"arm": {"particle": 3}}}, r"tracker: unknown setting 'arm.particle'; there are: particles, sigma_cost"),
     ({"tracker": 3}, r"tracker: found 3, expected a table \[tracker\]"),
     ({"preset": "liu"}, r"unknown preset 'liu'; there are: default, liu2011"),

@@ -14,6 +14,7 @@ from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.checkpoint import FRAMES, STATE
 from shadowpuppet.io.files.lock import LOCK
 from shadowpuppet.io.run_writer import CompleteRun
+from shadowpuppet.pipeline import progress
 from shadowpuppet.pipeline import track as module
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.prepare import MONOCULAR, MULTIVIEW
@@ -73,8 +74,8 @@ def film(request, recording, tmp_path_factory):
 
 
 def test_a_run_killed_anywhere_goes_on_to_the_same_result(film, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "CHECKPOINT_SECONDS", 0.0)
-    monkeypatch.setattr(module, "CHECKPOINT_COST", 2.0)  # not after every frame: rows behind the checkpoint are cut
+    monkeypatch.setattr(progress, "CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr(progress, "CHECKPOINT_COST", 2.0)  # not after every frame: rows behind the checkpoint are cut
     folder = tmp_path / "run"
     after = sorted(np.random.default_rng(4).choice(np.arange(1, 15), KILLS, replace=False).tolist())
     whole = film(folder, Kills(folder, after))
@@ -92,8 +93,8 @@ def test_a_run_killed_anywhere_goes_on_to_the_same_result(film, tmp_path, monkey
 
 
 def test_only_the_same_run_goes_on_and_a_complete_one_does_not(film, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "CHECKPOINT_SECONDS", 0.0)
-    monkeypatch.setattr(module, "CHECKPOINT_COST", 0.0)
+    monkeypatch.setattr(progress, "CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr(progress, "CHECKPOINT_COST", 0.0)
     folder = tmp_path / "run"
     film(folder, Kills(folder, [4]))
     left = killed(folder, 4)

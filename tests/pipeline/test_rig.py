@@ -68,6 +68,14 @@ def numbers(made: Rig, **more) -> list[tuple[int | None, ...]]:
     return [tuple(None if image is None else number_of(image) for image in each.images) for each in sets]
 
 
+def test_sets_have_the_images_that_fit_the_masks(tmp_path):
+    made = rig(tmp_path, steady(3), steady(3))
+    darker = (lambda shot: Segmented(shot.image[:, :, 1] > 127, image=shot.image // 2), bright)
+    for each in synchronized_frames(made, darker):
+        assert each.corrected[1] is None
+        np.testing.assert_array_equal(each.corrected[0], each.images[0] // 2)
+
+
 def steady(count: int, rate: float = 10.0, start: float = 0.0) -> np.ndarray:
     return start + np.arange(count) / rate
 

@@ -34,6 +34,15 @@ def test_the_person_is_found(rng, method):
     assert not found[66:74, 53:60].any()  # between arm and body
 
 
+@pytest.mark.parametrize("gain", [1.0, 0.8])
+def test_a_silhouette_comes_with_the_frame_in_the_light_of_the_empty_scene(rng, gain):
+    wall, mask = scene(rng), figure()
+    segmenter, image = learn_background(empty_shots(rng, wall)), dressed(wall, mask)
+    found = segmenter.segmented(segmenter.labelled(shot(rng, (image * gain).astype(image.dtype))))
+    assert found.image is not None
+    assert np.abs(found.image.astype(float) - image)[mask].mean() < 4
+
+
 def test_it_works_from_a_single_picture_and_from_the_film_itself(rng):
     wall, mask = scene(rng), figure()
     away = empty_shots(rng, wall, 8)

@@ -9,7 +9,7 @@ import numpy as np
 from shadowpuppet.body.models import MODELS, average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.geometry import Array, rigid, rotation_about
-from shadowpuppet.io.people import PEOPLE, person_folder, write_header, write_place
+from shadowpuppet.io.people import open_places, person_folder, write_place
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run_writer import RunWriter
 from shadowpuppet.motion.limbs import limbs_of
@@ -69,8 +69,7 @@ def make_people(folder: Path, number: int = 2, frames: int = 12) -> Path:
     for n in range(1, number + 1):
         times = np.arange(frames) / RATE + (2 / RATE if n == 2 else 0)
         make_run(person_folder(folder, n), frames=frames, seed=n, spread=True, times=times)
-    with (folder / PEOPLE).open("wb") as file:
-        write_header(file)
+    with open_places(folder) as file:
         for n in range(1, number + 1):
             write_place(file, 0.0, n, "tracked", np.array([float(n), 0.0]))
     (folder / "run.toml").write_text((person_folder(folder, 1) / "run.toml").read_text())

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.synthetic import Bystander, Gesture, Ring, Scene, Spec
 from shadowpuppet.synthetic.company import members
@@ -15,6 +16,7 @@ from shadowpuppet.synthetic.movement.gestures import LEAD_SECONDS, shake_hands
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import _bystander, perform, synthesize
 from shadowpuppet.synthetic.spec_changes import SpecChanges, apply_changes
+from shadowpuppet.video import open_frames
 
 TOGETHER = ("round", "past", "dance", "shake_hands")
 
@@ -83,6 +85,17 @@ def test_each_has_a_truth_and_the_ready_silhouettes_are_of_all(tmp_path):
     alone = read_recording(synthesize(replace(spec, scene=Scene(empty_seconds=0.5)), tmp_path / "one"))
     assert alone.truths == ()
     assert alone.views[0].masks == tmp_path / "one" / "masks" / "cam1.mkv"
+
+
+def test_who_is_away_is_in_no_picture_and_has_no_place_in_the_truth(tmp_path):
+    someone = Bystander(ahead=1.0, motion=Gesture(motion="stand"), away=(0.5, 1.5))
+    spec = Spec(rate=2, frames=4, motion=(Gesture(motion="stand", seconds=3),), training=(), ring=Ring(count=2, size=(48, 32)),
+                scene=Scene(empty_seconds=0.5, bystanders=(someone,)))  # fmt: skip
+    folder = synthesize(spec, tmp_path / "made")
+    places = read_truth(folder / "truth_2.csv").positions
+    assert np.isnan(places).all((1, 2)).tolist() == [False, True, True, False]
+    people, first = ([frame.image for frame in open_frames(folder / kind / "cam1.mkv")] for kind in ("people", "masks"))
+    assert [bool((both > one).any()) for both, one in zip(people, first)] == [True, False, False, True]
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 7])

@@ -63,7 +63,8 @@ numbers = st.floats(0, 1)
 obstacles = st.builds(Obstacle, kind=st.sampled_from(["table", "chair", "pillar", "cabinet"]), ahead=st.floats(0.4, 1),
                       left=st.floats(-1, 1), turn_deg=st.floats(-180, 180), colour=st.integers(0, 99))  # fmt: skip
 bystanders = st.builds(Bystander, kind=st.sampled_from(["woman", "man", "child", "random"]), seed=st.integers(0, 99),
-                       ahead=st.floats(-3, -1), left=st.floats(-2, 2), turn_deg=st.floats(-180, 180))  # fmt: skip
+                       ahead=st.floats(-3, -1), left=st.floats(-2, 2), turn_deg=st.floats(-180, 180),
+                       away=st.none() | st.tuples(st.floats(0, 9), st.floats(0, 9)))  # fmt: skip
 scenes = st.builds(Scene, clothing=st.integers(0, 9), shadow=numbers, noise=st.floats(0, 40), camouflage=numbers,
                    flicker=st.floats(0, 0.5), drift=st.floats(-0.5, 0.5), crf=st.integers(0, 51),
                    background=st.sampled_from(["room", "plain", "cluttered", "textured"]),

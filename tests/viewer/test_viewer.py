@@ -467,7 +467,8 @@ def test_what_cannot_be_shown_is_said_in_a_sentence(tmp_path, capsys):
     run = str(make_run(tmp_path / "good", frames=3))
     for more, expected in ((["--pictures"], "--html"), (["--port", "70000"], "port"), (["--html", str(tmp_path / "a.png")], ".html"),
                            (["--html", str(tmp_path / "none" / "a.html")], "no folder"), (["--listen", "203.0.113.7"], "listen"),
-                           (["--start", "9"], "part of"), ([run, "--beside", run], "one of them"),
+                           (["--start", "9"], "part of"), (["--start", "900f"], "start and end: found "),
+                           (["--end", "1:30"], "end: found 1:30; expected seconds such as 3.5"), ([run, "--beside", run], "one of them"),
                            (["--truth", str(tmp_path / "a.txt")], "a.txt")):  # fmt: skip
         code, error = command(["view", run, "--no-open", *more]), capsys.readouterr()
         assert (code == 2, expected in error.err) == (True, True), (more, error.err)

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from typing import Literal
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, UnusedCliTokensError
 
 from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, one_line
 
@@ -77,7 +77,7 @@ def run(tokens: Sequence[str] | None = None) -> int:
         code = app(list(tokens), exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except (ShadowPuppetError, CycloptsError) as error:
-        print(f"error: {' '.join(one_line(error).split())}", file=sys.stderr)
+        print(f"error: {' '.join(_told(error).split())}", file=sys.stderr)
         return MISTAKE
     except KeyboardInterrupt as interrupt:
         print(f"interrupted{': ' if interrupt.args else ''}{' '.join(map(str, interrupt.args))}", file=sys.stderr)
@@ -86,3 +86,11 @@ def run(tokens: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     return code if isinstance(code, int) else 0
+
+
+def _told(error: Exception) -> str:
+    """A mistake in words."""
+    if isinstance(error, UnusedCliTokensError):
+        words = error.unused_tokens or ()
+        return one_line(f"found {' '.join(words)!r} after all that the command takes; a path with blanks belongs in quotes")
+    return one_line(error)

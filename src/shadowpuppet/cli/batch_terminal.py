@@ -12,7 +12,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from shadowpuppet.cli.terminal import Terminal, terminal
+from shadowpuppet.cli.terminal import LOG_EVERY, LogLines, Terminal, terminal
 from shadowpuppet.pipeline.batch.run import Batch
 from shadowpuppet.pipeline.batch.summary import BatchRun
 from shadowpuppet.pipeline.batch.tasks import Task
@@ -23,25 +23,28 @@ LINES = 16
 BAR = 30
 """Greatest width of the progress bar, characters."""
 PAUSE = 30.0
-"""Seconds between two lines if standard error is not a screen."""
+"""Greatest number of seconds between two lines if standard error is not a screen; a tenth of the time so far before that."""
+TOLD = 2
+"""Greatest number of workers in such a line."""
 
 
 class BatchTerminal(BatchListener):
-    """Shows a table on a screen, or a line every `PAUSE` seconds; failures and notes as warnings."""
+    """Shows a table on a screen, or else lines, often at first and in the end every `PAUSE` seconds; failures and notes as warnings."""
 
     def __init__(self, terminal: Terminal) -> None:
         """`terminal`: its console and warnings are used."""
         self.total = self.done = self.failed = self.before = 0
         self._terminal, self._at = terminal, dict[int, tuple[str, str]]()
-        self._began = self._last = monotonic()
+        self._began = monotonic()
+        self._log = LogLines(terminal.console, self._line, lambda: min(max((monotonic() - self._began) / 10, LOG_EVERY), PAUSE))
         self._live = Live(console=terminal.console, get_renderable=self._table, refresh_per_second=4, transient=True)
 
     def begin(self, total: int, before: int) -> None:
         """Show the table, in place of the terminal's own progress."""
         self._terminal.stop()
         self.total, self.before, self._began = total, before, monotonic()
-        if not self._terminal.quiet and self._terminal.console.is_terminal:
-            self._live.start()
+        if not self._terminal.quiet:
+            (self._live if self._terminal.console.is_terminal else self._log).start()
         if before and not self._terminal.quiet:
             self._terminal.console.print(f"{before} of {total} runs are done already", markup=False)
 
@@ -62,17 +65,15 @@ class BatchTerminal(BatchListener):
             self._terminal.warn(f"{task.name}: failed: {outcome['message']}")
         else:
             self._terminal.warn(f"{task.label}: {outcome['message']}; it is tried again")
-        if not self._live.is_started and not self._terminal.quiet and monotonic() - self._last > PAUSE:
-            self._last = monotonic()
-            self._terminal.console.print(self._counts(), markup=False)
 
     def note(self, message: str) -> None:
         """Print a warning."""
         self._terminal.warn(message)
 
     def stop(self) -> None:
-        """Remove the table."""
+        """Remove the table, or end the lines."""
         self._live.stop()
+        self._log.stop()
 
     def failures(self, batch: Batch) -> None:
         """Print the failed runs, a line for each reason."""
@@ -93,6 +94,11 @@ class BatchTerminal(BatchListener):
         failed = f", {self.failed} failed" if self.failed else ""
         until = f"  {_pace(pace)}, {_clock(left / pace)} left" if pace else ""
         return f"{self.before + self.done} of {self.total} runs done{failed}{until}"
+
+    def _line(self) -> str:
+        at = [f"{label}: {doing}" for _, (label, doing) in sorted(self._at.copy().items())]
+        more = [f"{len(at) - TOLD} more"] if len(at) > TOLD else []
+        return "; ".join([self._counts(), *at[:TOLD], *more])
 
     def _table(self) -> RenderableType:
         bar, workers = Table.grid(padding=(0, 2)), Table.grid(padding=(0, 2))

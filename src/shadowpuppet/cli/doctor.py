@@ -21,7 +21,7 @@ from rich.table import Table
 from rich.text import Text
 
 from shadowpuppet.cli.tables import show
-from shadowpuppet.errors import BROKEN
+from shadowpuppet.errors import BROKEN, extra_command
 
 OLDEST_PYTHON = (3, 11)
 MODULES = {"opencv-python-headless": "cv2", "python-osc": "pythonosc"}
@@ -258,7 +258,7 @@ def _extras() -> Iterator[Finding]:
             for name in names:
                 import_module(name)
         except ImportError:
-            yield Finding(f"extra {extra}", "missing", f"{purpose}: not installed", f"pip install 'shadowpuppet[{extra}]'")
+            yield Finding(f"extra {extra}", "missing", f"{purpose}: not installed", extra_command(extra))
         except Exception as error:  # such as a missing system library
             yield Finding(f"extra {extra}", "broken", f"{purpose}: {' '.join(str(error).split())[:200]}")
         else:

@@ -138,7 +138,8 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         world_text,
     )
 
-    yield "no pose", losses_text(measured["losses"])
+    if losses := losses_text(measured["losses"]):
+        yield "no pose", losses
     if feet := feet_text(measured["feet"]):
         yield "feet", feet
     if gait := gait_text(measured["gait"]):

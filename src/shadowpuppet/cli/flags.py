@@ -20,7 +20,7 @@ RUN, PERSON, CAMERAS, SCENE, PICTURES, LIVE, PROGRAMS, LEARNING, OTHER = (Group(
 """Headings of `--help`."""
 GROUPS = {
     **dict.fromkeys(("preset", "seed", "smooth", "cutoff", "gaps", "overlay"), RUN),
-    **dict.fromkeys(("height", "distance", "facing", "body", "person", "prior"), PERSON),
+    **dict.fromkeys(("height", "distance", "facing", "body", "person", "prior", "appearance"), PERSON),
     **dict.fromkeys(("rate", "speed", "countdown", "learn", "still", "show", "listen", "port", "record"), LIVE),
     **dict.fromkeys(("osc", "websocket", "origin", "lsl", "lsl_scope"), PROGRAMS),
     **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "start", "end", "max_size", "every"),
@@ -113,7 +113,7 @@ else:
     Flags = flags_of(Options)
     RunFlags = unpacked(Flags)
     """All options."""
-    LookFlags = unpacked(flags_of(Options, without=("every", "smooth", "facing", "cutoff", "gaps", "overlay")))
+    LookFlags = unpacked(flags_of(Options, without=("every", "smooth", "facing", "appearance", "cutoff", "gaps", "overlay")))
     """Options of commands that do not track."""
     OutletFlags = unpacked(flags_of(OutletSettings))
     """Programs that receive the motion."""

@@ -28,10 +28,15 @@ def _camera_table(look: Look) -> RenderableType:
     exact = f"these silhouettes overlap the ready ones by {look.exact_overlap:.3f}{exact_plain}" if look.exact_overlap is not None else None
     return pairs([
         ("recording", look.recording), ("camera", _camera(look)), ("film", _film(look)), ("scale", look.scale),
-        ("background", look.background), ("key", look.key if look.key != "none" else None), ("silhouettes", _areas(look)),
+        ("background", look.background), ("told by", _told_by(look.key) if look.key != "none" else None), ("silhouettes", _areas(look)),
         ("exact masks", exact), ("quality", _quality(look) if look.refusal is None else None),
         ("person", _person(look.person) if look.person is not None else None),
     ])  # fmt: skip
+
+
+def _told_by(key: str) -> str:
+    """By what persons are told from the scene, and why by that; `both` is a method's name."""
+    return key.replace("both", "both brightness and colour", 1) if key.startswith("both") else key
 
 
 def _camera(look: Look) -> str:
@@ -83,7 +88,7 @@ def _rig_table(look: RigLook) -> RenderableType:
                 "" if apart is None else f"{apart:.1f} px") for camera, apart in zip(look.cameras, look.agreement.apart))  # fmt: skip
     keys = sorted({camera.key.split(":")[0] for camera in look.cameras} - {"none"})
     below = [("background", "; ".join(sorted(set(map(_background, look.cameras))))),
-             ("keys", ", ".join(keys) or None), *_rig_scale(look)]
+             ("told by", ", ".join(map(_told_by, keys)) or None), *_rig_scale(look)]
     columns = ("camera", "pixels", "wide", "stands at, m", "person", "exact", "apart")
     if all(camera.exact_overlap is None for camera in look.cameras):
         columns, cameras = columns[:5] + columns[6:], (row[:5] + row[6:] for row in cameras)

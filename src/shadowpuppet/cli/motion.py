@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from shadowpuppet.body.models import WHOLE, WholeBodyName
 from shadowpuppet.cli.flags import LEARNING, Quiet, Switch, flags_of, given, output, unpacked
 from shadowpuppet.cli.tables import pairs, show, show_json, table
-from shadowpuppet.errors import SettingsError, choices
+from shadowpuppet.errors import SettingsError, choices, extra_command
 from shadowpuppet.io.motion import EXPORTS, READABLE
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.settings import settings_of, validate
@@ -63,7 +63,7 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
            to: Annotated[str, Parameter(help=f"Formats, separated by commas: {choices(EXPORTS)}; or all.")] = "bvh,c3d,trc,mot,csv,glb,npz",
            folder: Annotated[Path | None, output("Folder of the files. [default: export/ in the run's]")] = None,
            unit: Literal["m", "cm", "mm"] | None = None, missing: Literal["nan", "drop", "fill"] = "nan",
-           model: Literal["rajagopal", "gait2392", "pose2sim", "own"] = "rajagopal", weight: float | None = None,
+           model: Literal["rajagopal", "gait2392", "pose2sim", "own"] | None = None, weight: float | None = None,
            rest: Literal["t", "a", "hang"] = "hang", names: Literal["mixamo", "humanik", "unreal", "vrm"] | None = None,
            quiet: Quiet = False) -> None:  # fmt: skip
     """Write a run's motion for other programs: Blender, OpenSim, C3D viewers, game engines, pandas.
@@ -76,6 +76,7 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
         Unknown positions in .trc files: the text NaN, no frame that has one, or positions filled in between known frames.
     model
         OpenSim model whose coordinates .mot files have: Rajagopal 2016, gait2392, Pose2Sim's, or the .osim file of this command (own).
+        [default: own where osim is among the formats, else rajagopal]
     weight
         Of the person, kilograms, for the masses in .osim files. [default: average build]
     rest
@@ -95,7 +96,7 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
     with terminal(quiet) as listener:
         if to == "all" and find_spec("pyarrow") is None:
             formats.remove("parquet")
-            listener.warn("parquet is left out: it needs pyarrow; pip install 'shadowpuppet[formats]'")
+            listener.warn(f"parquet is left out: it needs pyarrow; {extra_command('formats')}")
         if to == "all" and read_run(one).motion.body_name not in WHOLE:
             formats.remove("osim")
             listener.warn("osim is left out: only whole bodies have bones of constant lengths, as an OpenSim model needs")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +28,7 @@ from shadowpuppet.cli.flags import (
     switch,
     unpacked,
 )
-from shadowpuppet.cli.tables import pairs, show, show_json
+from shadowpuppet.cli.tables import pairs, show, show_json, show_next, typed
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, choices, reason
 from shadowpuppet.settings import validate
 from shadowpuppet.synthetic.collection import named_specs
@@ -112,6 +111,8 @@ def synthesize(spec: Annotated[Path | None, Parameter(help="Spec file, TOML, as 
         recording = make_recording(chosen, folder, listener, force)
     if not quiet:
         show(_recording_table(chosen, recording))
+        show_next(typed("info", recording.path), typed("track", recording.path, "--overlay"),
+                  typed("synthesize", recording.path / "spec.toml", "-o", "FOLDER"))
 
 
 def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, with S1, S2, ...")], /, *,
@@ -143,6 +144,7 @@ def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, w
         write_humaneva(found, folder)
     if not quiet:
         show(_trial_table(found, folder))
+        show_next(typed("track", folder, "-o", "RUN", "--overlay"), typed("evaluate", "RUN", "--joints", "humaneva"))
 
 
 def masks(source: Annotated[Path | None, Parameter(help="Folder with video/, or a film or folder of pictures.")] = None, /, *,
@@ -181,7 +183,9 @@ def masks(source: Annotated[Path | None, Parameter(help="Folder with video/, or 
     with terminal(quiet) as listener:
         made = make_masks(recording, chosen, folder, listener, listener.note, calibrated=calibrated, replaced=force)
     if not quiet:
-        show(_masks_table(recording, chosen.name, folder, made, calibrated))
+        show(_masks_table(recording, chosen.name, folder, made))
+        flags = ("--masks", *(() if calibrated else ("--fov", "DEGREES")))
+        show_next(typed("info", folder, *flags), typed("track", folder, *flags, "--overlay"))
 
 
 def spec_of(path: Path | None, like: str | None, seed: int | None, flags: Any) -> Spec:
@@ -204,11 +208,10 @@ def _spec_line(spec: Spec) -> str:
 
 
 def _recording_table(spec: Spec, recording: Recording) -> Any:
-    """Table of the contents of a synthetic recording, and commands to use it with."""
+    """Table of the contents of a synthetic recording."""
     views, seconds, path = spec.views(), sum(gesture.seconds for gesture in spec.motion), recording.path
     first, cameras = views[0], f"{len(views)} cameras" if len(views) > 1 else "1 camera"
     extras = [thing.kind for thing in spec.scene.obstacles] + ["another person"] * len(spec.scene.bystanders)
-    program = os.environ.get("SHADOWPUPPET_COMMAND", "shadowpuppet")
     also = {"people/, truth_1.csv, ...": spec.scene.bystanders, "training.csv, training.trc": recording.training,
             "references/": recording.references}
     return pairs([
@@ -217,20 +220,15 @@ def _recording_table(spec: Spec, recording: Recording) -> Any:
         ("films", f"{cameras}, {first.size[0]} x {first.size[1]} pixels, {spec.rate:g} frames/s, {seconds:g} s of motion"),
         *([("faults", ", ".join(dict.fromkeys(fault.kind for fault in spec.faults)))] if spec.faults else []),
         ("truth", ", ".join(["truth.csv, truth.trc, masks/", *(name for name, there in also.items() if there)])),
-        ("again", f"{program} synthesize {path}/spec.toml -o FOLDER"),
-        ("look", f"{program} info {path}"),
-        ("track", f"{program} track {path} --overlay"),
     ])  # fmt: skip
 
 
-def _masks_table(recording: Recording, script: str, folder: Path, made: Sequence[MadeMasks], calibrated: bool) -> Any:
-    """Table of the masks that were made, and commands to use them with."""
+def _masks_table(recording: Recording, script: str, folder: Path, made: Sequence[MadeMasks]) -> Any:
+    """Table of the masks that were made."""
     frames, seconds = sum(one.frames for one in made), sum(one.seconds for one in made)
-    with_fov = "" if calibrated else " --fov DEGREES"
     return pairs([
         ("recording", str(folder)), ("masks", f"by {script}: {frames} frames, {frames / max(seconds, 1e-9):.1f} a second"),
         *((one.camera, f"person found in {100 * (1 - one.empty / max(one.frames, 1)):.0f} % of {one.frames} frames") for one in made),
-        ("look", f"shadowpuppet info {folder} --masks{with_fov}"), ("track", f"shadowpuppet track {folder} --masks{with_fov} --overlay"),
     ])  # fmt: skip
 
 
@@ -250,13 +248,12 @@ def _gestures(spec: Spec) -> str:
 
 
 def _trial_table(found: HumanEva, folder: Path) -> Any:
-    """Table of the contents of a trial of HumanEva, and commands to use it with."""
+    """Table of the contents of a trial of HumanEva."""
     views, duration = found.recording.views, found.recording.duration
     names = ", ".join(view.camera.name for view in views)
     return pairs([
         ("recording", str(folder)), ("films", f"{len(views)} cameras: {names}, {duration:.2f} s"),
         ("truth", _joints_known(found.truth)), ("training", _joints_known(found.training)),
-        ("track", f"shadowpuppet track {folder} -o RUN --overlay"), ("measure", "shadowpuppet evaluate RUN --joints humaneva"),
     ])  # fmt: skip
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
@@ -24,6 +26,16 @@ def show(*parts: RenderableType) -> None:
             console.print(part)
         lines = [line.rstrip() for line in captured.get().splitlines()]  # rich pads columns with blanks
         print("\n" * bool(n) + "\n".join(lines))
+
+
+def typed(*words: object) -> str:
+    """A command of this program as it is typed here: words with blanks are quoted."""
+    return f"{os.environ.get('SHADOWPUPPET_COMMAND', 'shadowpuppet')} {shlex.join(map(str, words))}"
+
+
+def show_next(*commands: str) -> None:
+    """Print commands to try next, each on one line however long it is, so that it can be pasted."""
+    print("\nnext", *commands, sep="\n  ")
 
 
 def show_json(value: Any) -> None:

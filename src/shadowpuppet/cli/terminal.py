@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
@@ -30,37 +30,53 @@ REPEAT_AFTER = 10.0
 """Seconds after which the same note is printed again."""
 
 
-class _Log:
-    """Progress as lines, for output that is no terminal: what is being done, every `LOG_EVERY` seconds."""
+class LogLines:
+    """Progress as lines, for output that is no terminal: a thread prints what `line` gives, each time `pause` seconds later."""
 
-    def __init__(self, console: Console) -> None:
-        self.console, self.what, self.total, self.done, self.began = console, "", None, 0, 0.0
+    def __init__(self, console: Console, line: Callable[[], str], pause: Callable[[], float]) -> None:
+        """Nothing is printed before `start`."""
+        self.console, self._line, self._pause = console, line, pause
         self._end: threading.Event | None = None
 
-    def begin(self, what: str, total: int | None) -> None:
-        """A phase begins; the thread that prints starts with the first."""
-        self.what, self.total, self.done, self.began = what, total, 0, monotonic()
+    def start(self) -> None:
+        """Start printing, unless that was done."""
         if self._end is None:
             self._end = threading.Event()
             threading.Thread(target=self._run, args=(self._end,), name="progress", daemon=True).start()
 
     def stop(self) -> None:
-        """Print no more, until the next phase begins."""
+        """Print no more, until the next start."""
         if self._end is not None:
             self._end.set()
             self._end = None
 
     def _run(self, end: threading.Event) -> None:
-        while not end.wait(LOG_EVERY):
-            seconds = monotonic() - self.began
-            count = f" {self.done}{f'/{self.total}' if self.total else ''}, {self.done / seconds:.1f} a second" if self.done else ""
-            self.console.print(f"{PROGRESS} {self.what}{count}, {seconds:.0f} s{_compiling()}", markup=False, soft_wrap=True)
+        while not end.wait(self._pause()):
+            self.console.print(f"{PROGRESS} {self._line()}{_compiling()}", markup=False, soft_wrap=True)
+
+
+class _Log(LogLines):
+    """What is being done, every `LOG_EVERY` seconds."""
+
+    def __init__(self, console: Console) -> None:
+        super().__init__(console, self._text, lambda: LOG_EVERY)
+        self.what, self.total, self.done, self.began = "", None, 0, 0.0
+
+    def begin(self, what: str, total: int | None) -> None:
+        """A phase begins; the thread that prints starts with the first."""
+        self.what, self.total, self.done, self.began = what, total, 0, monotonic()
+        self.start()
+
+    def _text(self) -> str:
+        seconds = monotonic() - self.began
+        count = f" {self.done}{f'/{self.total}' if self.total else ''}, {self.done / seconds:.1f} a second" if self.done else ""
+        return f"{self.what}{count}, {seconds:.0f} s"
 
 
 def _compiling() -> str:
     """That code is being compiled, in words; empty if none is."""
-    jit = sys.modules.get("shadowpuppet.jit")  # not imported for this: that takes a second
-    return ", compiling, once (a minute or two)" if jit is not None and jit.is_compiling() else ""
+    is_compiling = getattr(sys.modules.get("shadowpuppet.jit"), "is_compiling", None)  # not imported for this, or not yet to its end
+    return ", compiling, once (a minute or two)" if is_compiling is not None and is_compiling() else ""
 
 
 class _What(TextColumn):

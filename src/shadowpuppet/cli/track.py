@@ -25,7 +25,7 @@ from shadowpuppet.cli.flags import (
     switch,
     unpacked,
 )
-from shadowpuppet.cli.tables import error_table, files_in, metrics_table, pairs, people_table, show, table, verdict_table
+from shadowpuppet.cli.tables import error_table, files_in, metrics_table, pairs, people_table, show, show_next, table, typed, verdict_table
 from shadowpuppet.errors import PERSON_LOST, SettingsError, ShadowPuppetError
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.stream.settings import OutletSettings
@@ -38,10 +38,10 @@ if TYPE_CHECKING:
 
     DemoFlags = SessionFlags = LiveFlags = Any
 else:
-    KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "start", "end", "max_size", "every", "overlay")
+    KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "start", "end", "max_size", "every", "overlay", "appearance")
     DemoFlags = unpacked(flags_of(Options, without=KNOWN))
     """Options for recordings that are known."""
-    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "facing", "training")))
+    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "facing", "appearance", "training")))
     """Options of a live session."""
     LiveFlags = unpacked(flags_of(LiveSettings))
 
@@ -88,15 +88,12 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
 
 def _show_project(recording: Path, folder: Path) -> None:
     """The command that puts the run's joints where the program that made the project looks for them."""
-    import os
-
     from shadowpuppet.io.projects import find_project
 
     project = find_project(recording)
     if project is not None:
         formats, results = project.results
-        program = os.environ.get("SHADOWPUPPET_COMMAND", "shadowpuppet")
-        print(f"for {project.program}: {program} export {folder} --to {formats} -o {results}")
+        print(f"for {project.program}: {typed('export', folder, '--to', formats, '-o', results)}")
 
 
 def _people_done(folder: Path, metrics: Mapping[str, Any], quiet: bool) -> int:
@@ -126,14 +123,18 @@ def _after_a_film(camera: str) -> str:
             f"scene; `track {camera}` follows the person in all of it")
 
 
-def _check_earlier(folder: Path, force: bool) -> None:
-    """Ask at a terminal before an earlier run is replaced. Raises `ShadowPuppetError` if it is not to be."""
+def _check_earlier(folder: Path, force: bool, resumes: bool = True) -> None:
+    """Ask at a terminal before an earlier run is replaced. Raises `ShadowPuppetError` if it is not to be.
+
+    `resumes`: whether the command can go on with a run that was broken off.
+    """
     from shadowpuppet.io.run_writer import earlier_run
 
     earlier = None if force else earlier_run(folder)
     if earlier is None:
         return
-    said = f"{folder}: found a run that was broken off, expected --resume, which goes on with it, --force, which starts over"
+    how = "--resume, which goes on with it, --force, which starts over" if resumes else "--force, which replaces it"
+    said = f"{folder}: found a run that was broken off, expected {how}"
     if earlier["complete"]:
         said = f"{folder}: found a complete run, expected --force, which replaces it"
     if sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty():
@@ -144,7 +145,8 @@ def _check_earlier(folder: Path, force: bool) -> None:
 
 
 def live(camera: Annotated[str | None, Parameter(help="The camera, or a film to be played as if it were one, as --camera.")] = None, /, *,
-         folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None, config: Config = None,
+         folder: Annotated[Path | None, output("Folder of the run. [default: live-<date>-<time>]")] = None,
+         force: Annotated[bool, switch("Replace an earlier run in the folder.")] = False, config: Config = None,
          quiet: Quiet = False, flags: SessionFlags = None, settings: LiveFlags = None, outlets: OutletFlags = None) -> None:
     """Track a person in front of a camera as it happens, shown on a page for a browser; Ctrl-C ends it.
 
@@ -163,6 +165,7 @@ def live(camera: Annotated[str | None, Parameter(help="The camera, or a film to 
         raise SettingsError(f"camera: found {camera} and --camera {asked['camera']}, expected one of them")
     options, chosen = options_from(flags, config), validate(LiveSettings, asked, "flags")
     folder = folder or Path(strftime("live-%Y%m%d-%H%M%S"))
+    _check_earlier(folder, force, resumes=False)
     with terminal(quiet, folder) as listener:
         opened = open_outlets(validate(OutletSettings, given(outlets), "flags"))
         if chosen.show == "viewer":
@@ -224,13 +227,11 @@ def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and 
 
 
 def _show_next(folder: Path) -> None:
-    """Commands to try after the demo, as they are to be typed here."""
-    import os
-
-    program, run = os.environ.get("SHADOWPUPPET_COMMAND", "shadowpuppet"), folder / "run-ring"
-    print("\nA limb that is named above as doubtful is dashed in overlay.mp4, and has its own status in joints.csv.\n"
-          f"\nnext\n  {program} view {run}\n  {program} evaluate {run} --report {folder / 'run-ring.html'}\n"
-          f"  {program} export {run} --to bvh,trc\n  {program} track YOUR-FILM.mp4 --fov 65 --height 1.75 --overlay")
+    """Commands to try after the demo."""
+    run = folder / "run-ring"
+    print("\nA limb that is named above as doubtful is dashed in overlay.mp4, and has its own status in joints.csv.")
+    show_next(typed("view", run), typed("evaluate", run, "--report", folder / "run-ring.html"), typed("export", run, "--to", "bvh,trc"),
+              typed("track", "YOUR-FILM.mp4", "--fov", "65", "--height", "1.75", "--overlay"))
 
 
 def fit_person(recording: Recording, /, *, file: Annotated[Path, output("File that gets the sizes.")] = Path("person.toml"),

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
     ViewFlags = Any
 else:
-    TRACKING = ("preset", "seed", "height", "distance", "body", "person", "prior", "masks", "overlay", "smooth", "cutoff", "gaps", "facing")
+    TRACKING = ("preset", "seed", "height", "distance", "body", "person", "prior", "masks", "overlay", "smooth", "cutoff", "gaps", "facing",
+                "appearance")
     ViewFlags = unpacked(flags_of(Options, without=(*TRACKING, "start", "end")))
     """Options for looking at a recording."""
 
@@ -30,8 +31,8 @@ def view(what: Annotated[Path, Parameter(help="Folder of a run or a recording, f
          apart: Annotated[float, flag("Metres between the two; 0: one over the other.")] = 1.5,
          truth: Annotated[Path | None, flag("Truth of a run, in place of its recording's.")] = None,
          recording: Annotated[Path | None, flag("Recording of a run, if it was moved.")] = None,
-         start: Annotated[float | None, flag("Seconds at which it starts.")] = None,
-         end: Annotated[float | None, flag("Seconds at which it ends.")] = None,
+         start: Annotated[str | None, flag("Where to begin: 3.5 (seconds) or 120f (frames).")] = None,
+         end: Annotated[str | None, flag("Where to end, likewise.")] = None,
          html: Annotated[Path | None, flag("Write one file that plays in a browser without this program, and stop.", PAGE)] = None,
          pictures: Annotated[bool, switch("Include the films' pictures in that file: faces and rooms. Silhouettes are always in it.",
                                           PAGE)] = False,
@@ -57,7 +58,7 @@ def view(what: Annotated[Path, Parameter(help="Folder of a run or a recording, f
         scene = open_scene(what, options, truth, recording)
         if (second := other or beside) is not None:
             scene = side_by_side(scene, open_scene(second, options), apart)
-        scene = cut_scene(scene, start, end)
+        scene = cut_scene(scene, *_span(scene, start, end))
         for problem in scene.problems:
             listener.warn(problem)
         if html is None:
@@ -66,6 +67,17 @@ def view(what: Annotated[Path, Parameter(help="Folder of a run or a recording, f
         write_page(html, scene, pictures, listener)
     if not quiet:
         print(f"made  {html}, {html.stat().st_size / 1e6:.1f} MB")
+
+
+def _span(scene: Scene, start: str | None, end: str | None) -> tuple[float | None, float | None]:
+    """Seconds at which the part to be shown begins and ends; None for the scene's own."""
+    import numpy as np
+
+    from shadowpuppet.video.moments import span_of
+
+    rate = 1 / float(np.median(np.diff(scene.times))) if len(scene.times) > 1 else np.nan
+    begin, stop = span_of(start, end, rate, np.inf)
+    return (None if start is None else begin), (None if end is None else stop)
 
 
 def _check(other: Path | None, beside: Path | None, html: Path | None, pictures: bool, port: int | None) -> None:

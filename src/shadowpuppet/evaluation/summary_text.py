@@ -57,10 +57,10 @@ def _percent(share: float) -> str:
     return f"{100 * share:.0f} %" if share >= 0.01 else "under 1 %"
 
 
-def losses_text(losses: Mapping[str, Any]) -> str:
-    """Number of frames without a pose, and the longest gap."""
+def losses_text(losses: Mapping[str, Any]) -> str | None:
+    """Number of frames without a pose, and the longest gap; None without such frames."""
     if not losses["frames"]:
-        return "no frame"
+        return None
     return (f"{losses['frames']} frames ({100 * losses['share']:.1f} %) in {losses['gaps']} gaps; the longest {losses['longest_frames']} "
             f"frames, {losses['longest_s']:.2f} s, from {losses['longest_from_s']:.2f} s")
 

@@ -31,7 +31,7 @@ BVH_UNITS = {**METRES, "in": 0.0254}
 
 
 def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | None = None, unit: str | None = None,
-               missing: str = "nan", model: str = "rajagopal", weight: float | None = None, rest: str = "hang",
+               missing: str = "nan", model: str | None = None, weight: float | None = None, rest: str = "hang",
                names: str | None = None) -> list[Path]:
     """Write a run's motion as `<run>.<format>` for each of `formats`; returns the files' paths. Of several people a file each,
     `<run>-person-1.<format>`, ...
@@ -46,7 +46,8 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
         out: folder of the files (default: export/ in the run's).
         unit: of BVH and TRC files: m, cm or mm (default: m in BVH, mm in TRC).
         missing: what TRC files have for unknown positions: nan, drop or fill, as in `write_trc`.
-        model: of `MODELS`, whose coordinates MOT files have.
+        model: of `MODELS`, whose coordinates MOT files have, by default own
+            if `formats` has osim, so that the two files fit, else rajagopal.
         weight: of the person, kilograms, for .osim files (default: average build).
         rest: rest pose of skeletons (BVH, GLB, USDA), of `RAISED`.
         names: program whose names their bones have, of `OF_PROGRAMS` (default: ours).
@@ -54,6 +55,7 @@ def export_run(folder: str | Path, formats: Sequence[str], out: str | Path | Non
     unknown = [name for name in formats if name not in EXPORTS]
     if unknown or not formats:
         raise SettingsError(f"formats: found {unknown[0] if unknown else 'none'!r}, expected some of {choices(EXPORTS)}")
+    model = model or ("own" if "osim" in formats else "rajagopal")
     layout, whole = Layout.checked(unit, missing, model, weight, rest, names), Path(folder).resolve().name
     people = {f"{whole}-{path.name}": path for path in person_folders(folder).values()} or {whole: Path(folder)}
     exports = {name: RunExport(_on_floor(read_run(path)), layout) for name, path in people.items()}

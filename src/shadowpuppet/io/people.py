@@ -33,9 +33,19 @@ def person_folders(folder: str | Path) -> dict[int, Path]:
     return dict(sorted(found.items()))
 
 
-def write_header(file: BinaryIO) -> None:
-    """Begin people.csv."""
-    file.write(csv_line(list(HEADER)).encode())
+def open_places(folder: Path, size: int | None = None) -> BinaryIO:
+    """people.csv of a run that begins, or that goes on after its first `size` bytes. Raises `FormatError` if it has fewer."""
+    path = folder / PEOPLE
+    if size is None:
+        file = path.open("wb")
+        file.write(csv_line(list(HEADER)).encode())
+        return file
+    if not path.exists() or path.stat().st_size < size:
+        raise FormatError(f"{path}: found fewer lines than the checkpoint beside it, expected those of the run that it was written for")
+    file = path.open("r+b")
+    file.truncate(size)
+    file.seek(size)
+    return file
 
 
 def write_place(file: BinaryIO, time: float, person: int, status: str, place: Array) -> None:

@@ -22,7 +22,7 @@ from shadowpuppet.io.files.text import read_toml, write_whole
 from shadowpuppet.io.intervals import IntervalWriter
 from shadowpuppet.io.motion.npz import write_motion_npz
 from shadowpuppet.io.motion.table import run_headers, run_rows, write_raw
-from shadowpuppet.io.people import PEOPLE, remove_people
+from shadowpuppet.io.people import PEOPLE, person_folders, remove_people
 from shadowpuppet.io.run import ANGLES, CONTACTS, RAW, TABLES
 from shadowpuppet.motion.contact.contact import contacts_of
 from shadowpuppet.motion.motion import Mode, Motion, MotionBuilder, MotionFrame
@@ -48,9 +48,10 @@ class RunWriter:
     """
 
     def __init__(self, folder: str | Path, body_name: str, dof_names: Sequence[str], joint_names: Sequence[str],
-                 info: Mapping[str, Any], resume: bool | None = None) -> None:
+                 info: Mapping[str, Any], resume: bool | None = None, of_group: bool = False) -> None:
         """`info`: entries of run.toml; dataclasses, arrays and paths are converted, values of None are left out. `resume`: whether an
-        earlier run of the same `info` goes on from its checkpoint; None: no checkpoints are kept."""
+        earlier run of the same `info` goes on from its checkpoint; None: no checkpoints are kept. `of_group`: whether it is that of one of
+        several people, who have one checkpoint together."""
         taken = set(info) & set(OWN_KEYS)
         if taken:
             raise ShadowPuppetError(f"info: found {min(taken)!r}, which the run's writer fills in itself")
@@ -63,7 +64,7 @@ class RunWriter:
         self._tables: Sequence[BinaryIO] = ()
         self._resume, self._earlier, self._stack = resume, False, contextlib.ExitStack()
         self._before: list[MotionFrame] | None = None
-        self._people = False
+        self._people, self._of_group = False, of_group
 
     def __enter__(self) -> Self:
         """Make the folder, and lock it. Raises `ShadowPuppetError` if it cannot be used."""
@@ -77,7 +78,7 @@ class RunWriter:
                 probe.unlink()
             if not self._earlier:
                 self._write_info(complete=False)  # marks the folder as a run's before callers add files to it
-            elif self._resume:
+            elif self._resume and not self._of_group:
                 self._check_same(read_toml(self.folder / "run.toml", FormatError))
             self._stack = stack.pop_all()
         return self
@@ -87,6 +88,8 @@ class RunWriter:
         with self._stack:
             if self._people:
                 self._write_info(complete=kind is None)
+                if kind is None:
+                    self._remove_checkpoints(self.folder, *person_folders(self.folder).values())
             elif kind is None:
                 self.begin()
                 self._finish(complete=True)
@@ -105,31 +108,38 @@ class RunWriter:
             if not self._earlier and {path.name for path in self.folder.iterdir()} <= {"run.toml", LOCK}:
                 (self.folder / "run.toml").unlink()
 
-    def hand_over(self) -> None:
-        """Make the folder that of several people: an earlier run is removed, and only run.toml is written in it, with `people`; their
-        runs go into folders of their own (`io.people`)."""
+    def hand_over(self, types: Iterable[type] = ()) -> Any:
+        """Make the folder that of several people: only run.toml is written in it, with `people`; their runs go into folders of their own
+        (`io.people`). Returns the state of the last `checkpoint` of an earlier run that goes on; else that is removed, and there is none.
+        `types`: as in `resumed`."""
+        found = checkpoint.read_checkpoint(self.folder, types) if self._resume and self._earlier else None
+        self._people = True
+        self.info["people"] = 0
+        if found is not None:
+            return found.state
         if self._earlier:
             _unmark(self.folder)
             remove_people(self.folder, (*FILES, "run.toml"))
         with self._system_errors():
             for name in FILES:
                 (self.folder / name).unlink(missing_ok=True)
-        self._people = True
-        self.info["people"] = 0
         self._write_info(complete=False)
+        return None
 
     def resumed(self, types: Iterable[type]) -> tuple[Any, list[MotionFrame]] | None:
         """The state that the last `checkpoint` of the earlier run got, and its frames until then, from which `begin` goes on; None if the
         run begins at the start. `types`: the named tuples in the state. Raises `FormatError` for a damaged checkpoint."""
         found = checkpoint.read_checkpoint(self.folder, types) if self._resume and self._earlier else None
-        if found is None:
-            return None
-        frames = checkpoint.read_frames(self.folder, found.frames, len(self._motion.dof_names), len(self._motion.joint_names),
+        return None if found is None else (found.state, self.go_on(found.frames))
+
+    def go_on(self, number: int) -> list[MotionFrame]:
+        """The first frames of the earlier run, from which `begin` goes on. Raises `FormatError` if there are fewer than this number."""
+        frames = checkpoint.read_frames(self.folder, number, len(self._motion.dof_names), len(self._motion.joint_names),
                                         len(self._motion.limbs))
         for frame in frames:
             self._motion.append(frame)
         self._before = frames
-        return found.state, frames
+        return frames
 
     def checkpoint(self, state: Any) -> None:
         """Keep a state from which the run can go on after the frames so far. Raises `ShadowPuppetError` if it cannot be written."""
@@ -149,6 +159,10 @@ class RunWriter:
         """Keep a frame's other places of limbs, if it has any."""
         if frame.modes:
             self._modes[frame.time] = frame.modes
+
+    def __len__(self) -> int:
+        """Number of frames so far."""
+        return len(self._motion)
 
     @property
     def motion(self) -> Motion:
@@ -189,7 +203,7 @@ class RunWriter:
         """
         if self._tables:
             return
-        if self._earlier and self._before is None:
+        if self._earlier:
             _unmark(self.folder)
         with self._system_errors():
             for name in () if not self._earlier else FILES if self._before is None else MADE:
@@ -222,10 +236,15 @@ class RunWriter:
                   "limb_status": motion.limb_status_counts}
         write_metrics(self.folder, counts | self.metrics)
         self._write_info(complete)
-        if complete:
-            for name in (checkpoint.STATE, checkpoint.FRAMES):
-                with contextlib.suppress(OSError):
-                    (self.folder / name).unlink(missing_ok=True)
+        if complete and not self._of_group:
+            self._remove_checkpoints(self.folder)
+
+    @staticmethod
+    def _remove_checkpoints(*folders: Path) -> None:
+        """Remove what complete runs do not need any more."""
+        for path in (folder / name for folder in folders for name in (checkpoint.STATE, checkpoint.FRAMES)):
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
 
     def _write_info(self, complete: bool) -> None:
         import tomli_w
@@ -240,7 +259,7 @@ class RunWriter:
         import tomli_w
 
         ours = tomllib.loads(tomli_w.dumps(self.info))
-        for key in sorted((earlier.keys() | ours.keys()) - {"complete", "frames", "smoothing", "floor"}):
+        for key in sorted((earlier.keys() | ours.keys()) - {"complete", "frames", "smoothing", "floor", "people"}):
             if difference := _difference(key, earlier.get(key), ours.get(key)):
                 raise ShadowPuppetError(f"{self.folder}: the run there cannot go on as another one: {difference}")
         if earlier["complete"]:

@@ -113,6 +113,8 @@ class Options:
     """Cut-off frequency of the Butterworth filter, Hz."""
     gaps: Annotated[float, Field(ge=0, le=10)] | None = None
     """Longest gap in the motion that is bridged, seconds; its frames are `predicted`. By default 0.5, and 0 with the papers' presets."""
+    appearance: bool = True
+    """Whether several people are told apart by the colours of their clothes (not of their heads), where there are pictures."""
     tracker: MonocularSettings = MonocularSettings()
     """Tracker for one camera."""
     multiview: MultiviewSettings = MultiviewSettings()

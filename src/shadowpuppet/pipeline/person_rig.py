@@ -162,14 +162,20 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
 
 def average_person(rng: np.random.Generator, cameras: Sequence[Camera], options: Options, rate: float, height: float) -> MultiviewSubject:
     """A person of average sizes for a height, metres, as `fit_in_views` makes one who cannot be measured."""
-    settings = options.multiview
-    known, sizes = familiar(rng, options, None, settings.body, rate), average_sizes(settings.body, height)
-    source, prior = "the height alone: not seen apart from other people", known.prior if settings.method == "hybrid" else None
-    tracker = MultiviewTracker(make_body(settings.body, sizes), tuple(cameras), for_rate(settings, rate), prior,
-                               known.poses if len(known.poses) else None, looks=looks_in(settings.patience, rate))
+    sizes, source = average_sizes(options.multiview.body, height), "the height alone: not seen apart from other people"
     summary = {"source": source, "sizes": dict(zip(sizes.names(), map(float, sizes.to_array()), strict=True))}
-    return MultiviewSubject(body=tracker.body, person=Person(sizes, height, source), summary=summary,
-                            hull=VisualHull(cameras, settings.hull), tracker=tracker, is_measured=False)
+    return known_person(rng, cameras, options, rate, Person(sizes, height, source), summary, is_measured=False)
+
+
+def known_person(rng: np.random.Generator, cameras: Sequence[Camera], options: Options, rate: float, person: Person,
+                 summary: dict[str, Any], is_measured: bool) -> MultiviewSubject:
+    """A person of known sizes, without training motion, as `fit_in_views` makes one; `summary`: how they were found."""
+    settings = options.multiview
+    known, hull = familiar(rng, options, None, settings.body, rate), VisualHull(cameras, settings.hull)
+    prior = known.prior if settings.method == "hybrid" else None
+    tracker = MultiviewTracker(make_body(settings.body, person.sizes), tuple(cameras), for_rate(settings, rate), prior,
+                               known.poses if len(known.poses) else None, looks=looks_in(settings.patience, rate))
+    return MultiviewSubject(body=tracker.body, person=person, summary=summary, hull=hull, tracker=tracker, is_measured=is_measured)
 
 
 def _beside(unexplained: Unexplained | None, body: Mask, size: tuple[int, int]) -> BesideBody | None:

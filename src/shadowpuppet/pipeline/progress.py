@@ -6,7 +6,7 @@ import contextlib
 import json
 import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -109,6 +109,24 @@ class StageTimer:
             if item is None:
                 return
             yield item
+
+
+CHECKPOINT_SECONDS, CHECKPOINT_COST = 1.0, 50.0
+"""Least time from one checkpoint to the next: in seconds, and over the time that it takes to write one."""
+
+
+class Checkpoints:
+    """Writes checkpoints as often as they cost little."""
+
+    def __init__(self) -> None:
+        """The first one is due at once."""
+        self._due = 0.0
+
+    def keep(self, write: Callable[[], None]) -> None:
+        """Write one, if it is due."""
+        if (now := time.perf_counter()) >= self._due:
+            write()
+            self._due = time.perf_counter() + max(CHECKPOINT_SECONDS, CHECKPOINT_COST * (time.perf_counter() - now))
 
 
 class LeftOut(NamedTuple):

@@ -56,6 +56,8 @@ class FrameSet(NamedTuple):
     """Seconds of making silhouettes, likewise."""
     own: tuple[Mask | None, ...] = ()
     """Silhouettes (H, W) as each camera's own picture has them; empty where other cameras have added nothing to `masks`."""
+    corrected: tuple[Image | None, ...] = ()
+    """Images that fit the masks, in the light of the empty scene (`Segmented.image`); empty: not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +183,8 @@ def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = F
             sharing = time.perf_counter() - start
             yield FrameSet(moment, tuple(part.image for part in parts), masks,
                            sum(part.decoding for part in parts), sum(part.segmenting for part in parts) + sharing,
-                           () if all(map(operator.is_, own, masks)) else own)
+                           () if all(map(operator.is_, own, masks)) else own,
+                           tuple(None if each is None else each.image for each in found))
 
 
 class _Part(NamedTuple):

@@ -51,7 +51,8 @@ class Silhouettes:
     def segmented(self, frame: CameraFrame) -> Segmented:
         """The person's silhouette, and what is taken for shadow."""
         if self.segmenter is None:
-            return self._kept(Segmented(ready_mask(frame.ready if frame.ready is not None else frame.image)))
+            ready = frame.image if frame.ready is None else frame.ready
+            return self._kept(Segmented(ready_mask(ready), image=None if frame.ready is None else frame.image))
         return self._kept(self.segmenter.segmented(self.segmenter.labelled(frame.image)))
 
     def following(self) -> Callable[[CameraFrame], Segmented]:
@@ -104,7 +105,8 @@ class Silhouettes:
     def _kept(self, found: Segmented) -> Segmented:
         """A silhouette within the region, without clutter."""
         again = found.with_limbs
-        return Segmented(self._person(found.mask), found.shadow, None if again is None else lambda limbs: self._person(again(limbs)))
+        return Segmented(self._person(found.mask), found.shadow, None if again is None else lambda limbs: self._person(again(limbs)),
+                         found.image)
 
     def _person(self, mask: Mask) -> Mask:
         mask = self._within(mask)

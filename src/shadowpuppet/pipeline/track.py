@@ -6,6 +6,7 @@ import time
 from array import array
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,6 +23,7 @@ from shadowpuppet.pipeline.people.run import PeopleRun, check_people
 from shadowpuppet.pipeline.prepare import Kind, Prepared, fit_survey, kind_of, look_around
 from shadowpuppet.pipeline.progress import (
     FALLBACK_RATE,
+    Checkpoints,
     LeftOut,
     Listener,
     StageTimer,
@@ -51,9 +53,6 @@ from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother, smoothed_p
 from shadowpuppet.video import write_frames
 
 __all__ = ["Listener", "Summary", "json_text", "track_recording"]
-
-CHECKPOINT_SECONDS, CHECKPOINT_COST = 1.0, 50.0
-"""Least time from one checkpoint to the next: in seconds, and over the time that it takes to write one."""
 
 
 @one_blas_thread()
@@ -87,7 +86,7 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         start = time.perf_counter()
         survey = look_around(rig, options, kind, cache, listener)
         if survey.several and (survey.look.refusal is None or options.anyway):
-            return _run_people(writer, survey, options, listener, (for_look, for_track), resume)
+            return _run_people(writer, survey, options, listener, (for_look, for_track))
         prepared = fit_survey(for_look, survey, options, kind, cache, listener)
         writer.metrics |= {"kept_silhouettes": True} if cache is not None and cache.is_complete(options) else {}
         writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
@@ -107,15 +106,14 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
 
 
 def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: Listener,
-                rngs: tuple[np.random.Generator, np.random.Generator], resume: bool) -> Summary:
+                rngs: tuple[np.random.Generator, np.random.Generator]) -> Summary:
     """Track several people, each into a folder of their own."""
     assert survey.census is not None
-    check_people(options, resume)
+    check_people(options)
     listener.look(survey.look)
     _check_cutoff(options, survey.look.rate)
-    writer.hand_over()
     entries = {key: value for key, value in writer.info.items() if key not in (*OWN_KEYS, "people", "truth")}
-    people = PeopleRun(writer.folder, survey, survey.census, options, entries, listener)
+    people = PeopleRun(writer, survey, survey.census, options, entries, listener)
     found = people.track(*rngs, smooth_run)
     if not found:
         raise TrackingError(f"{survey.look.recording}: nobody is found in the silhouettes of {survey.census.number} people")
@@ -198,7 +196,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
     (look, _, state, before, left_out), earlier = _resumed(writer, prepared, rng)
     writer.begin()
     write_beside(writer.folder, prepared.look, survey.rig, prepared.check().person)
-    watch, count, due = RigWatch(len(survey.rig.footage)), len(earlier), 0.0
+    watch, count, checkpoints = RigWatch(len(survey.rig.footage)), len(earlier), Checkpoints()
     leans, last = array("d"), None
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
     listener.begin("tracking", tracked(prepared.look.frames, options.every))
@@ -233,9 +231,8 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
                     writer.write(found)
                     if overlay is not None:
                         overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found, last))
-                    if (now := time.perf_counter()) >= due:
-                        writer.checkpoint(Carried(look, rng.bit_generator.state, subject.kept(state), before, left_out))
-                        due = time.perf_counter() + max(CHECKPOINT_SECONDS, CHECKPOINT_COST * (time.perf_counter() - now))
+                    carried = Carried(look, rng.bit_generator.state, subject.kept(state), before, left_out)
+                    checkpoints.keep(partial(writer.checkpoint, carried))
                 count += 1
                 listener.advance(count)
     finally:

@@ -43,6 +43,8 @@ class Segmented(NamedTuple):
     """As in `Labelled`."""
     with_limbs: Callable[[NDArray[np.bool_]], NDArray[np.bool_]] | None = None
     """From pixels (H, W) of `shadow` that are the person's to the mask (H, W) with them; None without `shadow`."""
+    image: Image | None = None
+    """The frame (H, W, 3) or (H, W) as it would be where, and in the light in which, the camera saw the empty scene; None: not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +104,9 @@ class Segmenter:
             return mask | self.finished(labelled._replace(label=np.where(limbs, np.maximum(labelled.label, 1), labelled.label)))
 
         mask = self.finished(labelled)
-        return Segmented(mask) if labelled.shadow is None else Segmented(mask, labelled.shadow, with_limbs)
+        if labelled.shadow is None:
+            return Segmented(mask, image=labelled.image)
+        return Segmented(mask, labelled.shadow, with_limbs, labelled.image)
 
     def labelled(self, image: Image) -> Labelled:
         """A frame's pixels after step 3. Raises `SilhouetteError` for a frame that does not fit the background."""

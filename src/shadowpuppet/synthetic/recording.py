@@ -54,13 +54,15 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     absent = wrong[0].absent()
     for name in ("truth", *["truth_1"][: len(others)]):
         write_truth(folder / name, times, figure.joints, spec.rate, feet, absent)
-    for n, other in enumerate(others, 2):
-        write_truth(folder / f"truth_{n}", times, other.joints, spec.rate)
-    figure = _away(figure, absent)
+    gone = [_gone(someone, times) for someone in company]
+    for n, (other, left) in enumerate(zip(others, gone), 2):
+        write_truth(folder / f"truth_{n}", times, other.joints, spec.rate, absent=left)
+    wall = _wall(figure, others)
+    figure, others = _away(figure, absent), [_away(other, left) for other, left in zip(others, gone)]
     _write_given(folder, spec, cameras, for_training)
     hidden = 0
     for n, (camera, noise, faults) in enumerate(zip(cameras, for_noise.spawn(len(cameras)), wrong)):
-        studio = SceneRenderer(spec, camera, noise, others, _wall(figure, others), faults)
+        studio = SceneRenderer(spec, camera, noise, others, wall, faults)
         hides, seen = _shoot(folder, spec, studio, figure, _part(tell, n * len(times), len(cameras) * len(times)))
         hidden += hides
         if not seen:
@@ -125,6 +127,12 @@ def _away(figure: Figure, absent: np.ndarray) -> Figure:
         return figure
     place = np.where(absent, FAR_BELOW, 0.0)[:, None, None] * np.array([0.0, 0, -1])
     return figure._replace(joints=figure.joints + place, origin=figure.origin + place)
+
+
+def _gone(someone: Bystander, times: Array) -> np.ndarray:
+    """The frames, of shape (T,), in which a bystander is away."""
+    begin, end = someone.away or (0.0, 0.0)
+    return (begin <= times) & (times < end)
 
 
 def _wall(figure: Figure, others: list[Figure]) -> float:

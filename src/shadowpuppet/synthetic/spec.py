@@ -42,6 +42,8 @@ class Bystander:
     from_start: bool = False
     """Whether they stand in the first frame at that distance from where the person stands then; else the middle of the area over which they
     walk is that far from the middle of the person's."""
+    away: tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]] | None = None
+    """Seconds from and to which they are not in the scene; None: they are always there."""
 
     def __post_init__(self) -> None:
         """Check that the bystander does not stand at the person's place; one who walks passes over it at other times."""

@@ -92,7 +92,7 @@ def test_without_pyarrow_a_sentence_says_what_to_install(tmp_path, monkeypatch, 
     write(tmp_path / "a.parquet", table(rng))
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     for call in (lambda: read(tmp_path / "a.parquet"), lambda: write(tmp_path / "b.parquet", table(rng))):
-        with pytest.raises(ShadowPuppetError, match=r"\.parquet: Parquet needs pyarrow, which is not installed: pip install"):
+        with pytest.raises(ShadowPuppetError, match=r"\.parquet: Parquet needs pyarrow, which is not installed: .*pip install"):
             call()
 
 

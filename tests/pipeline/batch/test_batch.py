@@ -399,8 +399,7 @@ def columns() -> int:
     return 100
 
 
-def test_batch_tells_what_came_of_it(shell, recording, tmp_path, monkeypatch):
-    monkeypatch.setattr("shadowpuppet.cli.batch_terminal.PAUSE", 1e9)  # on a busy machine this takes longer
+def test_batch_tells_what_came_of_it(shell, recording, tmp_path):
     (tmp_path / "grid.toml").write_text('seeds = "0"\n[case.drs]\n[case.srs]\ntracker.resampling = "stratified"\n')
     command = ["batch", recording, "gone", "-o", "out", "--config", "grid.toml", "--workers", 0, *FLAGS]
     code, out, err = shell(*command)

@@ -160,5 +160,5 @@ def test_a_scheduler_that_ends_is_said(recording, tmp_path, monkeypatch):
 
 def test_without_dask_it_is_said_what_is_missing(recording, tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
-    with pytest.raises(ShadowPuppetError, match=r"is not installed; pip install 'shadowpuppet\[batch\]'"):
+    with pytest.raises(ShadowPuppetError, match=r"is not installed; .*install 'shadowpuppet\[batch\]'"):
         run_batch([recording], tmp_path / "out", QUICK, scheduler="tcp://127.0.0.1:8786")

@@ -127,7 +127,7 @@ def test_files_are_reported_from_the_grids_folder_on(written, tmp_path):
     ("[grid]\nseed = [1, 2]", "grid.seed: found [1, 2], expected seeds = ..."),
     ("[case]\nfast = 3", "case.fast: found 3, expected a table of settings"),
     ("case = 'fast'", "case: found 'fast', expected a table [case]"),
-    ("[case.fast]\nspeed = 3", "case.fast: unknown setting 'speed'; there are: anyway, background"),
+    ("[case.fast]\nspeed = 3", "case.fast: unknown setting 'speed'; there are: anyway, appearance, background"),
     ("[case.fast]\nheight = 'tall'", "case.fast: height: found 'tall'"),
     ("[case.fast]\nseed = 3", "case.fast: found a seed in it"),
     ("[case.'a/b']\nmasks = true", "case: found the name 'a/b', expected letters"),

@@ -7,9 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from shadowpuppet.body.models import average_sizes
 from shadowpuppet.errors import TrackingError
+from shadowpuppet.io.files.nested import read_nested, write_nested
 from shadowpuppet.pipeline.people import group as module
 from shadowpuppet.pipeline.people.group import GONE_SECONDS, Group, first_people
+from shadowpuppet.pipeline.people.kept import TYPES, kept, restore
+from shadowpuppet.tracking.people.appearance import nothing
+from shadowpuppet.tracking.people.facing import Trial
 from shadowpuppet.tracking.people.figures import Figure
 from shadowpuppet.tracking.people.tracker import Begun, Share
 from shadowpuppet.tracking.people.walking import Step
@@ -24,7 +29,8 @@ def figure(x: float, height: float = 1.7) -> Figure:
 @pytest.fixture
 def scene(monkeypatch):
     """A group whose trackers follow people to their figure, and are lost where there is none; `figures` are those seen now."""
-    now = SimpleNamespace(figures=[], fits=0, refuse=False, facing=np.array([1.0, 0.0]), sided=True, measured=True, lead=0.0)
+    now = SimpleNamespace(figures=[], fits=0, refuse=False, facing=np.array([1.0, 0.0]), sided=True, measured=True, lead=0.0,
+                          images=())
 
     def fit(rng, sets):
         if now.refuse:
@@ -65,7 +71,7 @@ def scene(monkeypatch):
     def run(seconds: float, *figures: Figure) -> list[int]:
         now.figures = list(figures)
         for _ in range(round(seconds / STEP)):
-            now.group.next(now.time, None, [None])
+            now.group.next(now.time, None, [None], now.images)
             now.time += STEP
         return [member.number for member in now.group.present]
 
@@ -183,3 +189,96 @@ def test_a_sudden_turn_raises_doubt_until_it_is_tried(scene):
     scene.run(2.0, figure(0))
     assert member.facing.is_known
     assert len(member.facing.parts) == 2
+
+
+def dressed(bin: int):
+    found = nothing(1)
+    found[..., bin] = 50
+    return found
+
+
+@pytest.fixture
+def colours(scene, monkeypatch):
+    """Clothes of those who stand at a place, by its x: what the pictures show."""
+    worn: dict[float, int] = {}
+
+    def gather(group, time, bodies, free, masks, images):
+        for member in group.present:
+            if (bin := worn.get(round(float(member.state.place[0]), 1))) is not None:
+                group.identity.see(member.number, time, dressed(bin))
+        return [dressed(worn[round(float(each.place[0]), 1)]) for each in free]
+
+    monkeypatch.setattr(Group, "_gather", gather)
+    scene.images = [np.zeros((2, 2), np.uint8)]
+    return worn
+
+
+@pytest.mark.parametrize(("bin", "numbers"), [(20, [1]), (8, [2]), (28, [3]), (9, [2])])
+def test_who_comes_back_is_known_by_their_clothes(scene, colours, bin, numbers):
+    colours |= {0.0: 20, 2.0: 8, -1.0: bin}
+    scene.run(3.0, figure(0, 1.7), figure(2, 1.7))
+    assert scene.run(2.0) == []
+    assert scene.run(1.0, figure(-1, 1.71)) == numbers
+    assert not scene.group.identity.is_doubted(numbers[0])
+    assert scene.fits == max(2, numbers[0])
+
+
+def test_who_is_as_tall_and_dressed_alike_is_in_doubt(scene, colours):
+    colours |= {0.0: 20, 2.0: 20, -1.0: 20}
+    scene.run(3.0, figure(0, 1.7), figure(2, 1.7))
+    scene.run(2.0)
+    (number,) = scene.run(3.0, figure(-1, 1.7))
+    assert scene.group.identity.is_doubted(number)
+
+
+def test_without_pictures_who_is_as_tall_as_two_others_is_in_doubt(scene):
+    scene.run(3.0, figure(0, 1.7), figure(2, 1.7))
+    scene.run(2.0)
+    (number,) = scene.run(3.0, figure(-1, 1.7))
+    assert scene.group.identity.is_doubted(number)
+
+
+def test_people_who_were_exchanged_are_put_right(scene, colours):
+    colours |= {0.0: 20, 2.0: 8}
+    scene.run(3.0, figure(0), figure(2))
+    colours |= {0.0: 8, 2.0: 20}  # as if each tracker had gone over to the other
+    scene.run(1.5, figure(0), figure(2))
+    assert [round(float(member.state.place[0])) for member in scene.group.present] == [2, 0]
+    (exchange,) = scene.group.exchanges
+    assert (exchange.one, exchange.other) == (1, 2)
+    scene.run(3.0, figure(0), figure(2))
+    assert len(scene.group.exchanges) == 1
+
+
+def test_people_who_pass_through_each_other_are_in_doubt_without_colours(scene):
+    scene.run(1.0, figure(0), figure(2))
+    for n in range(10):
+        scene.run(STEP, figure(0.1 * n), figure(2 - 0.1 * n))
+    assert scene.group.identity.questions
+    scene.run(0.4, figure(0.95), figure(1.05))
+    scene.run(2.0, figure(0.6), figure(1.4))
+    assert all(scene.group.identity.is_doubted(member.number) for member in scene.group.present)
+
+
+def test_a_group_goes_on_from_what_is_kept(scene, colours, tmp_path):
+    colours |= {0.0: 20, 2.0: 8, -1.0: 28}
+    scene.sided = False  # so that there is a trial
+    scene.run(2.0, figure(0), figure(2))
+    scene.run(0.3, figure(0), figure(2), figure(-1))  # who comes
+    group = scene.group
+    group.identity.meet(1, 2, scene.time, is_open=True)
+    group.rng.random()
+    for member in group.members:
+        member.rng.random()
+        member.subject.person = SimpleNamespace(sizes=average_sizes("anatomical", 1.7), height=1.7, source="")
+        member.subject.summary, member.state = {"overlap": 0.9}, None
+        member.trial = None if member.trial is None else Trial(member.trial.begun, None)
+    write_nested(tmp_path / "kept.npz", kept(group))
+    again = Group(None, None, None, np.random.default_rng(0))
+    restore(again, read_nested(tmp_path / "kept.npz", TYPES), lambda held: group.members[0].subject)
+    assert str(kept(again)) == str(kept(group))
+    assert again.rng.spawn(1)[0].random() == group.rng.spawn(1)[0].random()
+    assert [each.random() for each in (again.rng, *(member.rng for member in again.members))] == [
+        each.random() for each in (group.rng, *(member.rng for member in group.members))]  # fmt: skip
+    (coming,), (look, *_) = again.coming, list(again.seen.values())[::-1]
+    assert any(figure is coming.figures[-1] for figure in look.figures)

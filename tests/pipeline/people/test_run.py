@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
+import made
 import made_rig
 import numpy as np
 import pytest
 from solids import Ellipsoid, ring, seen_by
 
-from shadowpuppet.errors import SettingsError, ShadowPuppetError
+from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError
+from shadowpuppet.io.checkpoint import FRAMES as EXACT
+from shadowpuppet.io.checkpoint import STATE
+from shadowpuppet.io.files.lock import LOCK
 from shadowpuppet.io.people import person_folders, read_places
 from shadowpuppet.io.run import read_run
+from shadowpuppet.io.run_writer import CompleteRun
 from shadowpuppet.motion.motion import MotionFrame
+from shadowpuppet.pipeline import progress
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.people.census import people_in, sampled_sets, take_census
 from shadowpuppet.pipeline.people.fitting import views_of
 from shadowpuppet.pipeline.people.group import first_people
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people, matched_truths
-from shadowpuppet.pipeline.track import track_recording
+from shadowpuppet.pipeline.prepare import MULTIVIEW
+from shadowpuppet.pipeline.progress import Listener
+from shadowpuppet.pipeline.rig import open_rig
+from shadowpuppet.pipeline.track import run as track_run
 from shadowpuppet.tracking.people.figures import find_people
 
-FRAMES = 6
+FRAMES, KILLED = 6, (1, 4)
 
 
 def cameras():
@@ -48,13 +59,41 @@ def seen():
     return made, [[np.logical_or.reduce([seen_by(camera, one) for one in people(n)]) for camera in made] for n in range(FRAMES)]
 
 
+class Kills(Listener):
+    """Keeps the folder of a run as it is when a process is killed after some of its frames."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def advance(self, frames: int) -> None:
+        if frames in KILLED:
+            for name in (f"killed-{frames}", f"killed-{frames}-spare"):
+                shutil.copytree(self.folder, self.folder.with_name(name))
+
+
 @pytest.fixture(scope="module")
-def run(seen, tmp_path_factory):
-    made, masks = seen
-    folder = tmp_path_factory.mktemp("people")
-    recording = made_rig.write(folder / "recording", made, masks)
-    options = make_options({"masks": True, "multiview": {"particles": 4}})
-    return track_recording(recording, folder / "run", options)
+def tracked(seen, tmp_path_factory):
+    """How to track the recording into a folder: it is surveyed once."""
+    rig, masks = seen
+    recording = made_rig.write(tmp_path_factory.mktemp("people") / "recording", rig, masks)
+    options = make_options({"masks": True, "overlay": True, "multiview": {"particles": 4}})
+    opened = open_rig(recording, options)
+    survey = MULTIVIEW.survey(opened, options)
+
+    def track(folder, listener=None, resume=False, **changed):
+        kind = MULTIVIEW._replace(survey=lambda *_, **__: survey)
+        return track_run(opened, kind, folder, replace(options, **changed), listener or Listener(), resume=resume)
+
+    return track
+
+
+@pytest.fixture(scope="module")
+def run(tracked, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(progress, "CHECKPOINT_SECONDS", 0.0)
+        patch.setattr(progress, "CHECKPOINT_COST", 0.0)
+        return tracked(folder, Kills(folder))
 
 
 def test_each_has_a_run_of_their_own(run):
@@ -69,6 +108,46 @@ def test_each_has_a_run_of_their_own(run):
         assert {"joints.csv", "angles.csv", "motion.npz", "person.toml", "calibration.toml", "look.json"} <= names
 
 
+def contents(folder: Path) -> dict[str, bytes]:
+    """The files of a run but for overlays and times."""
+    files = (path for path in folder.rglob("*") if path.is_file() and path.name not in ("overlay.mp4", "metrics.json", LOCK))
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+@pytest.mark.parametrize("frames", KILLED)
+def test_a_run_killed_anywhere_goes_on_to_the_same_result(run, tracked, frames):
+    left = run.folder.with_name(f"killed-{frames}")
+    assert (left / STATE).exists()
+    with (left / "people.csv").open("a") as rows:
+        rows.write("0.5,1,tra")  # a row that was being written
+    done = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Listener, "advance", lambda _, frames: done.append(frames))
+        tracked(left, resume=True)
+    assert done == list(range(frames + 1, FRAMES + 1))
+    ours, theirs = contents(left), contents(run.folder)
+    assert sorted(ours) == sorted(theirs)
+    assert [name for name in ours if ours[name] != theirs[name]] == []
+    assert len(made.images(left / "overlay.mp4")) == FRAMES
+
+
+def test_what_a_run_cannot_go_on_from(run, tracked, tmp_path):
+    left = shutil.copytree(run.folder.with_name("killed-4-spare"), tmp_path / "left")
+    with pytest.raises(ShadowPuppetError, match=r"cannot go on as another one: settings\.seed was 0, and is 4"):
+        tracked(left, resume=True, seed=4)
+    exact = left / "person-2" / EXACT
+    whole = exact.read_bytes()
+    exact.write_bytes(whole[:-9])
+    with pytest.raises(FormatError, match=r"checkpoint\.frames: found 3 frames, expected 4"):
+        tracked(left, resume=True)
+    exact.write_bytes(whole)
+    (left / "people.csv").write_text("time,person,status,x,y\n")
+    with pytest.raises(FormatError, match=r"people\.csv: found fewer lines than the checkpoint beside it"):
+        tracked(left, resume=True)
+    with pytest.raises(CompleteRun):
+        tracked(run.folder, resume=True)
+
+
 def test_places_are_those_of_the_people(run):
     ends = sorted((where[-1].round(2).tolist() for _, _, where in read_places(run.folder).values()), key=lambda place: place[0])
     assert np.allclose(ends, [(-0.6, 0.3), (0.9, -0.4)], atol=0.15)
@@ -80,8 +159,8 @@ def test_the_number_is_said(run):
 
 
 def test_sizes_are_measured_where_people_are_apart(seen):
-    made, masks = seen
-    census = take_census(made, masks)
+    rig, masks = seen
+    census = take_census(rig, masks)
     assert census is not None
     assert census.number == 2
     assert census.numbers == (2,) * FRAMES
@@ -109,9 +188,9 @@ def test_a_picture_that_is_all_silhouette_shows_nobody():
 
 
 def test_who_comes_later_is_counted(seen):
-    made, masks = seen
-    alone = [[seen_by(camera, people(n)[0]) for camera in made] for n in range(FRAMES)]
-    census = take_census(made, alone, masks)
+    rig, masks = seen
+    alone = [[seen_by(camera, people(n)[0]) for camera in rig] for n in range(FRAMES)]
+    census = take_census(rig, alone, masks)
     assert census is not None
     assert census.number == 2
     assert census.numbers == (1,) * FRAMES + (2,) * FRAMES
@@ -128,10 +207,8 @@ def test_parts_of_a_picture_that_may_be_people():
 
 
 def test_what_several_people_cannot_have():
-    with pytest.raises(ShadowPuppetError, match="--resume: found several people"):
-        check_people(make_options({}), True)
     with pytest.raises(SettingsError, match=r"person: found .*one\.toml for several people"):
-        check_people(make_options({"person": "one.toml"}), False)
+        check_people(make_options({"person": "one.toml"}))
 
 
 def test_no_truth_is_nobodys(run):

@@ -11,7 +11,7 @@ import pytest
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
-from shadowpuppet.tracking.people.facing import Facing, Trial
+from shadowpuppet.tracking.people.facing import Doubted, Facing, Trial
 
 SIZES = average_sizes("anatomical", 1.75)
 BODY = make_body("anatomical", SIZES)
@@ -66,7 +66,7 @@ def test_frames_that_faced_the_right_way_get_the_status_that_they_would_have_had
     truth, facing = walk(), Facing()
     facing.begin(TIMES[0], is_known=False)
     for time in TIMES[:5]:
-        facing.doubted[float(time)] = MotionFrame(float(time), "tracked", limb_status=["tracked"] * (len(truth.limbs) - 1) + ["uncertain"])
+        facing.doubted[float(time)] = Doubted("tracked", ("tracked",) * (len(truth.limbs) - 1) + ("uncertain",))
     facing.show(TIMES[5], wrong=False)
     found = facing.corrected(truth, BODY, SIZES)
     assert found.status.tolist() == ["tracked"] * 5 + ["uncertain"] * 7

@@ -57,8 +57,14 @@ def gait_of(run: Run) -> tuple[Gait | None, str]:
         return None, ("no foot ever stands" if soles else f"the body {motion.body_name!r} has no feet; the body 'anatomical' has, with "
                       "several cameras")
     gait = find_gait(motion.times, contacts, motion.joint_names, motion.joints, motion.joint_sd, _sure(motion))
-    strikes = " and ".join(f"{gait.strikes[side]} of the {side} foot" for side in SIDES)
-    return gait, "" if gait.strides else f"no full stride: {strikes} strike the floor; {left_out_text(gait)}"
+    return gait, "" if gait.strides else f"no full stride: {_strikes_text(gait)}"
+
+
+def _strikes_text(gait: Gait) -> str:
+    """How often feet strike the floor, and what becomes of the steps between."""
+    if not any(gait.strikes.values()):
+        return "no foot strikes the floor"
+    return " and ".join(f"{gait.strikes[side]} of the {side} foot" for side in SIDES) + f" strike the floor; {left_out_text(gait)}"
 
 
 def movement_of(run: Run) -> Movement:

@@ -7,7 +7,7 @@ import importlib.util
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.errors import ShadowPuppetError, extra_command
 from shadowpuppet.evaluation.error_metrics import aligned_distances
 from shadowpuppet.evaluation.evaluation import Evaluation, check_output
 from shadowpuppet.evaluation.interval_coverage import LEVELS
@@ -36,7 +36,7 @@ def check_report(path: str | Path, folder: str | Path) -> None:
     """Raise `ShadowPuppetError` if no page can be written there."""
     check_output(path, folder, ".html")
     if importlib.util.find_spec("matplotlib") is None:
-        raise ShadowPuppetError(f"{path}: a report needs matplotlib: pip install 'shadowpuppet[report]'")
+        raise ShadowPuppetError(f"{path}: a report needs matplotlib: {extra_command('report')}")
 
 
 def write_report(path: str | Path, of: Evaluation) -> None:

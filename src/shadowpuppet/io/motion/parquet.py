@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, check_regular
+from shadowpuppet.errors import FormatError, ShadowPuppetError, check_regular, extra_command
 from shadowpuppet.io.files.npz import most_unpacked
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import errors_named, write_whole
@@ -73,5 +73,5 @@ def _arrow(path: str | Path) -> tuple[ModuleType, ModuleType]:
         import pyarrow
         import pyarrow.parquet
     except ImportError:
-        raise ShadowPuppetError(f"{path}: Parquet needs pyarrow, which is not installed: pip install 'shadowpuppet[formats]'") from None
+        raise ShadowPuppetError(f"{path}: Parquet needs pyarrow, which is not installed: {extra_command('formats')}") from None
     return pyarrow, pyarrow.parquet

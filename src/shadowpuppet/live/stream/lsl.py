@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from shadowpuppet.errors import SettingsError
+from shadowpuppet.errors import SettingsError, extra_command
 from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, Subject
 
 CONFIG = "[multicast]\nResolveScope = {scope}\n{listen}[log]\nlevel = -3\n"
@@ -35,7 +35,7 @@ class LslOutlet(Outlet):
         try:
             import pylsl  # pyright: ignore[reportMissingImports]
         except ImportError:
-            raise SettingsError("lsl: needs the library pylsl: pip install 'shadowpuppet[lsl]'") from None
+            raise SettingsError(f"lsl: needs the library pylsl: {extra_command('lsl')}") from None
         except (OSError, RuntimeError) as error:  # pylsl found no liblsl that this machine can load
             raise SettingsError(f"lsl: the library liblsl cannot be loaded ({' '.join(str(error).split())})") from None
         if not stream.strip():

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from http import HTTPStatus
 from typing import Any, Self
 
-from shadowpuppet.errors import SettingsError, reason
+from shadowpuppet.errors import SettingsError, extra_command, reason
 from shadowpuppet.live.stream.json_messages import beginning, framed
 from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, Subject
 from shadowpuppet.network import (
@@ -42,7 +42,7 @@ class WebSocketOutlet(Outlet):
         try:
             import websockets.asyncio.server  # noqa: F401
         except ImportError:
-            raise SettingsError("websocket: needs the library websockets: pip install 'shadowpuppet[live]'") from None
+            raise SettingsError(f"websocket: needs the library websockets: {extra_command('live')}") from None
         self.origins, self.loopback, self._socket = frozenset(origins), is_loopback(host), _listening(host, port)
         self.port = self._socket.getsockname()[1]
         self.where = f"WebSocket at ws://{shown_host(host)}:{self.port}/"

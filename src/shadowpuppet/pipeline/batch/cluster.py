@@ -7,7 +7,7 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.errors import ShadowPuppetError, extra_command
 from shadowpuppet.pipeline.batch.tasks import Task
 from shadowpuppet.pipeline.batch.workers import BatchListener, Outcome, WorkerPool
 
@@ -46,7 +46,7 @@ class Cluster(WorkerPool):
         try:
             from distributed import Client, as_completed
         except ImportError:
-            raise ShadowPuppetError("scheduler: Dask's `distributed` is not installed; pip install 'shadowpuppet[batch]'") from None
+            raise ShadowPuppetError(f"scheduler: Dask's `distributed` is not installed; {extra_command('batch')}") from None
         file: dict[str, Any] = {("scheduler_file" if Path(self._address).is_file() else "address"): self._address}
         said = None
         try:

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError
+from shadowpuppet.errors import FormatError, ShadowPuppetError, extra_command
 from shadowpuppet.io.files.table import csv_line
 from shadowpuppet.io.files.text import read_text, write_whole
 from shadowpuppet.io.motion.parquet import write_lists
@@ -77,7 +77,7 @@ def check_table(table: str) -> None:
     if table not in TABLES:
         raise ShadowPuppetError(f"table: found {table!r}, expected one of {', '.join(TABLES)}")
     if table == "parquet" and find_spec("pyarrow") is None:
-        raise ShadowPuppetError("table: parquet needs pyarrow, which is not installed; pip install 'shadowpuppet[formats]', or take csv")
+        raise ShadowPuppetError(f"table: parquet needs pyarrow, which is not installed; {extra_command('formats')}, or take csv")
 
 
 def _column(rows: Sequence[Mapping[str, Any]], name: str) -> list[Any]:

@@ -73,5 +73,9 @@ def fit_apart(rng: np.random.Generator, cameras: Sequence[Camera], floor: Floor,
         chosen = [apart[n] for n in evenly_spread(len(apart), MOST_SETS)]
         with contextlib.suppress(TrackingError):
             subject = fit_in_views(rng, cameras, chosen, replace(options, height=None), rate, tall)
-    subject = subject or average_person(rng, cameras, options, rate, tall)
+    return unsettled(subject or average_person(rng, cameras, options, rate, tall))
+
+
+def unsettled(subject: MultiviewSubject) -> MultiviewSubject:
+    """A person among others: what their body does not explain is not left out, as it may be somebody."""
     return replace(subject, tracker=replace(subject.tracker, looks=0))

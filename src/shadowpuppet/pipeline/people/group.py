@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
@@ -14,13 +15,16 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.pipeline.person_rig import HullObservation, MultiviewSubject
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState
+from shadowpuppet.tracking.people.appearance import Colours, apart_from, colours_of_body, colours_of_figure, dressed_parts
 from shadowpuppet.tracking.people.evidence import Drawn, draw_person, predicted
 from shadowpuppet.tracking.people.facing import LONGEST_TRIAL, Facing, Trial
-from shadowpuppet.tracking.people.figures import Figure, find_people
+from shadowpuppet.tracking.people.figures import Figure, drawn, find_people
 from shadowpuppet.tracking.people.floor import Floor
+from shadowpuppet.tracking.people.identity import CLEAR, DIFFERENT, Exchange, Identity
 from shadowpuppet.tracking.people.presence import Followed, follow
 from shadowpuppet.tracking.people.tracker import Person, Share, explained, follow_turned, place_of, start, step, turn_round
 from shadowpuppet.tracking.people.walking import ALONG, Walk, step_of
+from shadowpuppet.tracking.unexplained import near
 
 TURN_LOSS = 0.05
 """Overlap by which a body turned round may fit worse if the person walks that way: among others front and back differ by 0.02."""
@@ -36,6 +40,21 @@ SAME_PLACE = 0.6
 """Distance (m) from a person within which a figure is theirs."""
 SAME_HEIGHT = 0.1
 """Greatest difference (m) between the height of a person who enters and that of one who has left, if they may be the same."""
+CLOSE, WITHIN = 0.6, 0.2
+"""Distance (m) of two people below which they may be exchanged; below which motion does not tell whether they were."""
+
+Images = Sequence[NDArray[np.uint8] | None]
+"""A picture (H, W, 3) or (H, W) a camera; empty: clothes are not looked at."""
+
+
+class Look(NamedTuple):
+    """A moment at which people were looked for."""
+
+    figures: Sequence[Figure]
+    masks: Sequence[Mask | None]
+    worn: Sequence[Colours | None]
+    """Colours of each figure; None for people who are tracked, and without pictures."""
+
 
 Sighting = tuple[Figure, Sequence[Figure], Sequence[Mask | None]]
 """A person in a frame set: their figure, the others', and the masks (H, W) by camera."""
@@ -86,10 +105,13 @@ class Group:
     rng: np.random.Generator
     members: list[Member] = field(default_factory=list)
     coming: list[Followed] = field(default_factory=list)
-    seen: dict[int, tuple[list[Figure], Sequence[Mask | None]]] = field(default_factory=dict)
-    """Figures and masks of the looks that `coming` refers to, by number."""
+    seen: dict[int, Look] = field(default_factory=dict)
+    """The looks that `coming` refers to, by number."""
     looks: int = 0
     due: float = -np.inf
+    identity: Identity = field(default_factory=Identity)
+    exchanges: list[Exchange] = field(default_factory=list)
+    """People who were exchanged, as their colours told later."""
 
     def add(self, subject: MultiviewSubject, height: float, place: Array) -> Member:
         """A new person, not yet tracked, whose figure is first seen at a place (2,)."""
@@ -121,8 +143,8 @@ class Group:
         """Whether all people are tracked and no other seems to come: else what bodies leave unexplained says nothing about cameras."""
         return not self.coming and all(member.state is not None and member.state.status == "tracked" for member in self.present)
 
-    def next(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
-        """Update all people by a frame's surface points and masks (H, W), one per camera."""
+    def next(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None], images: Images = ()) -> None:
+        """Update all people by a frame's surface points and masks (H, W), and the images that fit these, one per camera."""
         people = {member.number: Person(member.subject.tracker, member.rng, member.state)
                   for member in self.present if member.state is not None}  # fmt: skip
         for number, share in step(people, points, masks).items():
@@ -133,7 +155,7 @@ class Group:
             self._face_the_way(member, time)
         if time >= self.due:
             self.due = time + LOOK_SECONDS
-            self._look(time, points, masks)
+            self._look(time, points, masks, images)
         for member in self.present:
             if member.lost_since is not None and time - member.lost_since >= GONE_SECONDS:
                 member.state = member.share = member.lost_since = member.before = None
@@ -185,15 +207,18 @@ class Group:
         member.walk.forget()
         member.state, member.share = turned, member.share._replace(state=turned)
 
-    def _look(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
-        """Find new, returning and lost people among the figures that no tracked body explains."""
+    def _look(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None], images: Images) -> None:
+        """See who is who, and find new, returning and lost people among the figures that no tracked body explains."""
         drawn = {member.number: member.share.drawn for member in self.present if member.share is not None and member.lost_since is None}
         figures = find_people(self.floor, masks, explained(drawn, len(masks)))
         places = [place_of(member.subject.body, member.state) for member in self.present
                   if member.state is not None and member.lost_since is None]  # fmt: skip
         free = [figure for figure in figures if all(np.linalg.norm(place - figure.place) > SAME_PLACE for place in places)]
+        worn = self._gather(time, drawn, free, masks, images) if any(image is not None for image in images) else [None] * len(free)
+        self._tell_apart(time)
         self.looks += 1
-        self.seen[self.looks] = (figures, masks)
+        of_free = {id(figure): colours for figure, colours in zip(free, worn)}
+        self.seen[self.looks] = Look(figures, masks, [of_free.get(id(figure)) for figure in figures])
         self.coming = follow([each for each in self.coming if time - each.times[-1] <= FORGET_SECONDS], self.looks, time, free)
         for each in list(self.coming):
             if len(each.sets) >= NEW_LOOKS and each.times[-1] == time and time - each.times[0] >= NEW_SECONDS - 1e-6:
@@ -202,17 +227,64 @@ class Group:
         oldest = min((each.sets[0] for each in self.coming), default=self.looks)
         self.seen = {n: seen for n, seen in self.seen.items() if n >= oldest}
 
+    def _gather(self, time: float, bodies: Mapping[int, Drawn], free: Sequence[Figure], masks: Sequence[Mask | None],
+                images: Images) -> list[Colours | None]:
+        """See how people are dressed where only they are seen; returns the same of the free figures."""
+        cameras = self.floor.cameras
+        beside = {number: [near(mask) for mask in body.masks] for number, body in bodies.items()}
+        figures = [drawn(self.floor, figure) for figure in free]
+        for number, body in bodies.items():
+            member = self.members[number - 1]
+            if member.state is not None and member.state.status == "tracked":
+                apart = apart_from(masks, [*figures, *(other for n, other in beside.items() if n != number)])
+                limbs = member.subject.body.limbs
+                assert limbs is not None
+                self.identity.see(number, time, colours_of_body(cameras, body.centres, body.radii, dressed_parts(limbs), apart, images))
+        return [colours_of_figure(cameras, figure.place, figure.height, self.floor.level,
+                                  apart_from(masks, [*beside.values(), *(other for other in figures if other is not own)]), images)
+                for figure, own in zip(free, figures)]  # fmt: skip
+
+    def _tell_apart(self, time: float) -> None:
+        """Note who may have been exchanged because they are close, and put right who was."""
+        people = [(member, place_of(member.subject.body, member.state)) for member in self.present if member.state is not None]
+        for n, (one, place) in enumerate(people):
+            for other, there in people[n + 1 :]:
+                if (away := float(np.linalg.norm(place - there))) < CLOSE:
+                    lost = one.lost_since is not None or other.lost_since is not None
+                    self.identity.meet(one.number, other.number, time, is_open=lost or away < WITHIN)
+        exchange = self.identity.decide(time, [member.number for member, _ in people if member.lost_since is None])
+        if exchange is not None:
+            self._exchange(self.members[exchange.one - 1], self.members[exchange.other - 1], time)
+            self.exchanges.append(exchange)
+
+    @staticmethod
+    def _exchange(one: Member, other: Member, time: float) -> None:
+        """Each of two people is where the other was."""
+        known = one.facing.is_known, other.facing.is_known
+        for name in ("state", "share", "lost_since", "walk"):
+            theirs = getattr(other, name)
+            setattr(other, name, getattr(one, name))
+            setattr(one, name, theirs)
+        for member, is_known in ((one, known[1]), (other, known[0])):
+            member.before = member.trial = None
+            if member.state is not None and member.share is not None:
+                member.state = follow_turned(member.subject.tracker, member.rng, member.state, member.share)
+                member.share = member.share._replace(state=member.state)
+                member.facing.begin(time, is_known)
+
     def _enter(self, found: Followed, time: float, drawn: dict[int, Drawn], points: SurfacePoints,
                masks: Sequence[Mask | None]) -> None:
-        """Start tracking the person of a figure: a lost one near it, one of that height who has left, or a new one."""
+        """Start tracking the person of a figure: a lost one near it, one of that height and those colours who has left, or a new one."""
         figure = found.figures[-1]
-        member = self._known(figure, found.height)
-        if member is None:
-            try:
-                member = self.add(self.fit(self.rng, seen_in(found, self.seen)), found.height, figure.place)
-            except TrackingError:
-                return
+        alike = self._known(found)
+        try:
+            member = alike[0] if alike else self.add(self.fit(self.rng, seen_in(found, self.seen)), found.height, figure.place)
+        except TrackingError:
+            return
         self.begin(member, time, figure, drawn, points, masks)
+        if member.state is not None and member.lost_since is None:
+            for other in alike[1:]:
+                self.identity.meet(member.number, other.number, time, is_open=True)
 
     def begin(self, member: Member, time: float, figure: Figure, drawn: dict[int, Drawn], points: SurfacePoints,
               masks: Sequence[Mask | None]) -> None:
@@ -224,17 +296,27 @@ class Group:
             member.facing.begin(time, begun.is_sided and member.subject.is_measured)
             member.walk.forget()
 
-    def _known(self, figure: Figure, height: float) -> Member | None:
-        """The lost or absent person that a figure may be; None: a new person."""
+    def _known(self, found: Followed) -> list[Member]:
+        """The lost or absent people who a figure may be, the most likely first; none: a new person."""
         away = [member for member in self.members if member.state is None or member.lost_since is not None]
-        alike = [member for member in away if abs(member.height - height) <= SAME_HEIGHT]
+        alike = [member for member in away if abs(member.height - found.height) <= SAME_HEIGHT]
+        unlike = {member.number: self.identity.unlike(member.number, self._worn(found)) for member in alike}
+        alike = [member for member in alike if member.state is not None or not unlike[member.number] > DIFFERENT]
+        best = min((each for member in alike if np.isfinite(each := unlike[member.number])), default=np.inf)
 
         def distance(member: Member) -> float:
             if member.state is None:
-                return 10.0 + abs(member.height - height)
-            return float(np.linalg.norm(place_of(member.subject.body, member.state) - figure.place))
+                return 10.0 + abs(member.height - found.height)
+            return float(np.linalg.norm(place_of(member.subject.body, member.state) - found.place))
 
-        return min(alike, key=distance, default=None)
+        return sorted((member for member in alike if not unlike[member.number] > best + CLEAR), key=distance)
+
+    def _worn(self, found: Followed) -> Colours | None:
+        """The colours of a figure that was followed."""
+        looks = [(self.seen[n], figure) for n, figure in zip(found.sets, found.figures)]
+        worn = [colours for look, figure in looks for other, colours in zip(look.figures, look.worn) if other is figure]
+        seen = [colours for colours in worn if colours is not None]
+        return np.add.reduce(seen) if seen else None
 
     def drawn(self) -> dict[int, Drawn]:
         """The bodies of the people present, as predicted for the next frame."""
@@ -242,9 +324,10 @@ class Group:
                 for member in self.present if member.state is not None}  # fmt: skip
 
 
-def seen_in(found: Followed, looks: Mapping[int, tuple[Sequence[Figure], Sequence[Mask | None]]]) -> list[Sighting]:
-    """Where a person is seen among others; `looks`: all figures and the masks (H, W) of each frame set, by number."""
-    return [(figure, [other for other in looks[n][0] if other is not figure], looks[n][1]) for n, figure in zip(found.sets, found.figures)]
+def seen_in(found: Followed, looks: Mapping[int, Look]) -> list[Sighting]:
+    """Where a person is seen among others, in looks by number."""
+    return [(figure, [other for other in looks[n].figures if other is not figure], looks[n].masks)
+            for n, figure in zip(found.sets, found.figures)]  # fmt: skip
 
 
 def first_people(floor: Floor, times: Sequence[float], sets: Sequence[Sequence[Mask | None]]) -> tuple[list[Followed], list[list[Figure]]]:

@@ -6,16 +6,19 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.rasterize import Bits
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError, warn
 from shadowpuppet.io.motion.motion_files import read_truth
-from shadowpuppet.io.people import PEOPLE, person_folder, write_header, write_place
+from shadowpuppet.io.people import open_places, person_folder, write_place
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import RunWriter, write_metrics
 from shadowpuppet.motion.motion import JointTable, Motion, MotionFrame
@@ -25,14 +28,17 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.overlay_video import overlay_of_people
 from shadowpuppet.pipeline.people.census import Census
 from shadowpuppet.pipeline.people.fitting import fit_apart
-from shadowpuppet.pipeline.people.group import Group, Member, first_people, seen_in
+from shadowpuppet.pipeline.people.group import Group, Look, Member, first_people, seen_in
+from shadowpuppet.pipeline.people.kept import TYPES, KeptGroup, kept, remade, restore
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.pipeline.progress import (
     FALLBACK_RATE,
     STAGES,
+    Checkpoints,
     Listener,
     StageTimer,
     evaluated,
+    json_text,
     set_aside,
     timings,
     tracked,
@@ -44,6 +50,8 @@ from shadowpuppet.pipeline.subject import joint_names, motion_frame
 from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
+from shadowpuppet.tracking.people.exchanges import given_back
+from shadowpuppet.tracking.people.facing import Doubted
 from shadowpuppet.tracking.people.tracker import place_of
 from shadowpuppet.video import write_frames
 
@@ -53,19 +61,34 @@ Smooth = Callable[[RunWriter, Sequence[tuple[int, MultiviewSubject]], Options, L
 """Replaces the motion of a run by a given one, smoothed."""
 
 
-def check_people(options: Options, resume: bool) -> None:
+def check_people(options: Options) -> None:
     """Raise a `ShadowPuppetError` for what a run of several people cannot do."""
-    if resume:
-        raise ShadowPuppetError("--resume: found several people, whose runs cannot go on, expected --force, which starts over")
     if options.person is not None:
         raise SettingsError(f"person: found {options.person} for several people, expected none: each is measured")
+
+
+class Carried(NamedTuple):
+    """What a frame needs of those before it: what a checkpoint keeps. Silhouettes, and cameras set aside, follow from the films."""
+
+    look: str
+    """The text of look.json."""
+    size: int
+    """Of people.csv, bytes."""
+    numbers: tuple[int, ...]
+    """Number of frames of each person, by their numbers; 0 for one without a run so far."""
+    clear: NDArray[np.bool_]
+    """For each frame set, whether cameras could be judged in it."""
+    begun: bool
+    """Whether the first people have been looked for."""
+    group: KeptGroup
 
 
 @dataclass(eq=False)
 class PeopleRun:
     """A run of several people into a folder."""
 
-    folder: Path
+    writer: RunWriter
+    """Of the folder in which theirs are."""
     survey: Survey
     census: Census
     options: Options
@@ -76,21 +99,21 @@ class PeopleRun:
     def __post_init__(self) -> None:
         """Start without people."""
         self.rig: Rig = self.survey.rig
+        self.folder: Path = self.writer.folder
         self.writers = dict[int, RunWriter]()
         self.metrics = dict[str, Any]()
 
     def track(self, for_fit: np.random.Generator, for_track: np.random.Generator, smooth: Smooth) -> dict[int, dict[str, Any]]:
         """Track all people; returns each person's metrics by number, none if no person is found."""
+        carried: Carried | None = self.writer.hand_over((*TYPES, Carried))
+        if carried is not None and carried.look != json_text(self.survey.look):
+            raise ShadowPuppetError(f"{self.folder}: the run there cannot go on: its look.json differs from what the recording gives now")
         self.listener.begin(f"measuring {self.census.number} people")
-        group = self._group(for_fit, for_track)
+        group = self._group(for_fit, for_track, carried)
         with ExitStack() as stack:
-            self._follow(group, stack)
-            for member in group.members:
-                if member.number in self.writers:
-                    writer, subject = self.writers[member.number], member.subject
-                    assert isinstance(subject.person.sizes, BoneSizes)  # of a whole body
-                    motion = member.facing.corrected(writer.motion, subject.body, subject.person.sizes)
-                    smooth(writer, [(0, subject)], self.options, self.listener, motion)
+            self._follow(group, stack, carried)
+            for number, motion in self._put_right(group).items():
+                smooth(self.writers[number], [(0, group.members[number - 1].subject)], self.options, self.listener, motion)
             truths = matched_truths({n: writer.motion for n, writer in self.writers.items()}, self.rig.recording.truths)
             for n, truth in truths.items():
                 self.writers[n].info["truth"] = str(truth.resolve())
@@ -98,6 +121,16 @@ class PeopleRun:
         write_metrics(self.folder, self.metrics | {"people": len(found)})
         warn_of_set_aside(self.metrics.get("set_aside", []))
         return found
+
+    def _put_right(self, group: Group) -> dict[int, Motion]:
+        """The people's motions with what became known later: which way they faced, and who was who."""
+        motions, people = dict[int, Motion](), dict[int, tuple[Body, BoneSizes]]()
+        for number, writer in self.writers.items():
+            member = group.members[number - 1]
+            body, sizes = member.subject.body, member.subject.person.sizes
+            assert isinstance(sizes, BoneSizes)  # of a whole body
+            motions[number], people[number] = member.facing.corrected(writer.motion, body, sizes), (body, sizes)
+        return given_back(motions, group.exchanges, people)
 
     def _finished(self, number: int, truth: Path | None) -> dict[str, Any]:
         """The metrics of a person's finished run, written into its folder."""
@@ -109,8 +142,8 @@ class PeopleRun:
         write_metrics(folder, metrics)
         return metrics
 
-    def _group(self, for_fit: np.random.Generator, for_track: np.random.Generator) -> Group:
-        """The people of the first seconds, measured."""
+    def _group(self, for_fit: np.random.Generator, for_track: np.random.Generator, carried: Carried | None) -> Group:
+        """The people of the first seconds, measured, or those of a checkpoint."""
         rate, floor = self.rig.rate / self.options.every, self.census.floor
         first = self.survey.first
 
@@ -118,8 +151,11 @@ class PeopleRun:
             return fit_apart(rng, self.rig.cameras, floor, self.options, rate, sets)
 
         group = Group(floor, VisualHull(self.rig.cameras, self.options.multiview.hull), fit, for_track)
+        if carried is not None:
+            restore(group, carried.group, lambda held: remade(for_fit, self.rig.cameras, self.options, rate, held))
+            return group
         people, every = first_people(floor, first.times, first.masks)
-        seen = dict(enumerate(zip(every, first.masks)))
+        seen = {n: Look(figures, masks, ()) for n, (figures, masks) in enumerate(zip(every, first.masks))}
         for found in people:
             try:
                 group.add(fit(for_fit, seen_in(found, seen)), found.height, found.figures[0].place)
@@ -127,24 +163,35 @@ class PeopleRun:
                 continue  # may be found later
         return group
 
-    def _follow(self, group: Group, stack: ExitStack) -> None:
+    def _follow(self, group: Group, stack: ExitStack, carried: Carried | None) -> None:
         """For each frame set: segment, compute the hull, update all people, write."""
-        survey, options, timer = self.survey, self.options, StageTimer()
+        survey, options, timer, checkpoints = self.survey, self.options, StageTimer(), Checkpoints()
         look = survey.look
         assert isinstance(look, RigLook)
         rate = look.rate if np.isfinite(look.rate) else FALLBACK_RATE
-        watch, count, begun = RigWatch(len(self.rig.footage)), 0, False
+        watch, begun = RigWatch(len(self.rig.footage)), carried is not None and carried.begun
         self.listener.begin("tracking", tracked(look.frames, options.every))
         began = time.perf_counter()
         write_beside(self.folder, look, self.rig)
-        places = stack.enter_context((self.folder / PEOPLE).open("wb"))
-        write_header(places)
+        places = stack.enter_context(open_places(self.folder, None if carried is None else carried.size))
         overlay = stack.enter_context(write_frames(self.folder / "overlay.mp4", rate / options.every)) if options.overlay else None
         segment = [silhouettes.following() for silhouettes in survey.silhouettes]
         frames = stack.enter_context(closing(read_frames(self.rig, segment, ready=options.masks, every=options.every)))
+        clear = [] if carried is None else carried.clear.tolist()
+        earlier = iter(self._earlier(group, carried, stack))
+
+        def judged(seen: FrameSet, found: Mapping[int, MotionFrame], is_clear: bool) -> None:
+            drawn = [group.members[n - 1].subject.drawn(frame) for n, frame in found.items()]
+            watch.tracked(_together(drawn) if is_clear else ())
+            if overlay is not None:
+                overlay.write(overlay_of_people(seen, [(n, frame, group.members[n - 1].subject.pictures) for n, frame in found.items()]))
+
         try:
             for seen in timer.each("wait", frames):
                 masks = watch(seen.time, seen.masks, seen.own)
+                if (known := next(earlier, None)) is not None:
+                    judged(seen, *known)
+                    continue
                 timer.add(decode=seen.decoding, segment=seen.segmenting)
                 with timer.time("hull"):
                     points = group.hull.points(masks)
@@ -152,22 +199,37 @@ class PeopleRun:
                     if not begun and len(points.points):
                         begun = True
                         group.start(seen.time, points, masks)
-                    group.next(seen.time, points, masks)
-                    drawn = [member.subject.drawn(member.state) for member in group.present]
-                    watch.tracked(_together(drawn) if group.is_clear else ())
+                    group.next(seen.time, points, masks, seen.corrected if options.appearance else ())
                 with timer.time("write"):
                     found = self._write(group, seen, stack, places)
-                    if overlay is not None:
-                        overlay.write(overlay_of_people(seen, [(n, frame, group.members[n - 1].subject.pictures)
-                                                               for n, frame in found.items()]))
-                count += 1
-                self.listener.advance(count)
+                    clear.append(group.is_clear)
+                    judged(seen, found, clear[-1])
+                    checkpoints.keep(partial(self._keep, group, places, clear, begun))
+                self.listener.advance(len(clear))
         finally:
+            count = len(clear) - (0 if carried is None else len(carried.clear))
             self.metrics |= timings(timer, STAGES, count, time.perf_counter() - began) | set_aside(watch.intervals, self.rig.names)
+
+    def _keep(self, group: Group, places: BinaryIO, clear: Sequence[bool], begun: bool) -> None:
+        """Write a checkpoint."""
+        numbers = tuple(len(self.writers[member.number]) if member.number in self.writers else 0 for member in group.members)
+        self.writer.checkpoint(Carried(json_text(self.survey.look), places.tell(), numbers, np.array(clear), begun, kept(group)))
+
+    def _earlier(self, group: Group, carried: Carried | None, stack: ExitStack) -> list[tuple[dict[int, MotionFrame], bool]]:
+        """The frames of each frame set before a checkpoint, by person, and whether cameras could be judged in it."""
+        if carried is None:
+            return []
+        found = [(dict[int, MotionFrame](), is_clear) for is_clear in carried.clear.tolist()]
+        for member, number in zip(group.members, carried.numbers):
+            if number:
+                frames = self._open(member, stack, number)
+                for (people, _), frame in zip(found[len(found) - number :], frames, strict=True):
+                    people[member.number] = frame
+        return found
 
     @staticmethod
     def _doubted(frame: MotionFrame) -> MotionFrame:
-        """The frame of a person who may face the other way: nothing of it is `tracked`."""
+        """The frame of a person who may face the other way, or be another one: nothing of it is `tracked`."""
         limbs = None if frame.limb_status is None else ["uncertain" if status == "tracked" else status for status in frame.limb_status]
         return frame._replace(status="uncertain" if frame.status == "tracked" else frame.status, limb_status=limbs)
 
@@ -181,8 +243,11 @@ class PeopleRun:
                 frame, member.before = MotionFrame(seen.time, "absent"), None
             else:
                 frame, member.before = motion_frame(member.subject, seen.time, member.state, member.observation, member.before)
+                doubted = group.identity.is_doubted(member.number)
                 if not member.facing.is_known:
-                    member.facing.doubted[frame.time] = frame
+                    would_be = self._doubted(frame) if doubted else frame
+                    member.facing.doubted[frame.time] = Doubted(would_be.status, tuple(would_be.limb_status or ()))
+                if doubted or not member.facing.is_known:
                     frame = self._doubted(frame)
             self._writer(member, stack).write(frame)
             here = frame.status not in ("absent", "lost") and member.state is not None
@@ -195,13 +260,19 @@ class PeopleRun:
     def _writer(self, member: Member, stack: ExitStack) -> RunWriter:
         """The writer of a person's run, opened when they are first seen."""
         if member.number not in self.writers:
-            body, folder = member.subject.body, person_folder(self.folder, member.number)
-            writer = RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), self.info | {"person": member.number})
-            self.writers[member.number] = stack.enter_context(writer)
-            writer.begin()
-            subject = member.subject
-            write_beside(folder, self.survey.look_with(subject.summary, subject.doubts), self.rig, subject.person)
+            self._open(member, stack)
         return self.writers[member.number]
+
+    def _open(self, member: Member, stack: ExitStack, number: int = 0) -> list[MotionFrame]:
+        """Open the writer of a person's run; returns the earlier run's frames, of this `number`, after which it goes on."""
+        subject, folder = member.subject, person_folder(self.folder, member.number)
+        body, info = subject.body, self.info | {"person": member.number}
+        writer = RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, resume=bool(number), of_group=True)
+        self.writers[member.number] = stack.enter_context(writer)
+        frames = writer.go_on(number) if number else []
+        writer.begin()
+        write_beside(folder, self.survey.look_with(subject.summary, subject.doubts), self.rig, subject.person)
+        return frames
 
 
 def _together(drawn: Sequence[tuple[Bits, ...]]) -> tuple[Bits, ...]:

@@ -18,7 +18,7 @@ from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.inverse_kinematics import fit_poses
-from shadowpuppet.motion.motion import JointTable, Motion, MotionFrame
+from shadowpuppet.motion.motion import JointTable, Motion
 from shadowpuppet.tracking.multiview.tracker import MultiviewState
 
 SETTLING, LEAST_TRIAL, LONGEST_TRIAL = 0.4, 1.0, 3.0
@@ -33,19 +33,20 @@ class Trial:
     def __init__(self, time: float, state: MultiviewState) -> None:
         """`state`: of the body turned round, at a time (s)."""
         self.begun, self.state = time, state
-        self._leads = list[float]()
+        self.leads = list[float]()
+        """By how much the body as it is fitted better (overlap)."""
 
     def add(self, time: float, state: MultiviewState, overlap: float) -> None:
         """The next state of the body turned round, and the overlap of the body as it is."""
         self.state = state
         if time - self.begun >= SETTLING:
-            self._leads.append(float(np.nan_to_num(overlap) - np.nan_to_num(state.overlap)))
+            self.leads.append(float(np.nan_to_num(overlap) - np.nan_to_num(state.overlap)))
 
     def is_right(self, time: float) -> bool | None:
         """Whether the body as it is faces the right way; None if that is not clear yet."""
-        if time - self.begun < LEAST_TRIAL or not self._leads:
+        if time - self.begun < LEAST_TRIAL or not self.leads:
             return None
-        lead = float(np.mean(self._leads))
+        lead = float(np.mean(self.leads))
         return lead > 0 if abs(lead) >= CLEARLY else None
 
 
@@ -60,6 +61,14 @@ class Part(NamedTuple):
     """Whether the body faced the wrong way until then."""
 
 
+class Doubted(NamedTuple):
+    """What a frame would be if the front were known."""
+
+    status: str
+    limbs: tuple[str, ...]
+    """Status of each limb."""
+
+
 @dataclass(eq=False)
 class Facing:
     """What is known about the front of one person over time."""
@@ -67,8 +76,8 @@ class Facing:
     parts: list[Part] = field(default_factory=list)
     is_known: bool = True
     """Whether it is known now."""
-    doubted: dict[float, MotionFrame] = field(default_factory=dict)
-    """Frames, by time (s), as they would be if the front were known."""
+    doubted: dict[float, Doubted] = field(default_factory=dict)
+    """Frames, by time (s), that are doubted for their front alone."""
 
     def begin(self, time: float, is_known: bool) -> None:
         """The person was found at a time (s), so that the body may face another way than before."""
@@ -98,18 +107,24 @@ class Facing:
         out = _exchanged(motion, wrong, body, sizes) if wrong.any() else motion
         status, limbs = out.status.copy(), out.limb_status.copy()
         for n in np.flatnonzero(known & ~wrong):
-            if (frame := self.doubted.get(float(motion.times[n]))) is not None and frame.limb_status is not None:
-                status[n], limbs[n] = frame.status, frame.limb_status
+            if (frame := self.doubted.get(float(motion.times[n]))) is not None and frame.limbs:
+                status[n], limbs[n] = frame
         return replace(out, status=status, limb_status=limbs)
+
+
+def refitted(motion: Motion, joints: Array, frames: NDArray[np.bool_], body: Body, sizes: BoneSizes) -> tuple[Array, Array]:
+    """Poses (T, D) and joints (T, J, 3) of a motion in which those of some frames (T,) are the body's nearest to given `joints`."""
+    poses, joints = motion.poses.copy(), joints.copy()
+    fitted = fit_poses(JointTable(motion.times[frames], motion.joint_names, joints[frames]), body.name, sizes, any_bend=True)
+    poses[frames], joints[frames] = fitted.poses, body.points(fitted.poses)
+    return poses, joints
 
 
 def _exchanged(motion: Motion, frames: NDArray[np.bool_], body: Body, sizes: BoneSizes) -> Motion:
     """A motion in which the joints of some frames (T,) are those of the other side, in poses that reach them."""
-    joints, poses = motion.joints.copy(), motion.poses.copy()
+    joints = motion.joints.copy()
     joints[frames] = joints[frames][:, other_side(motion.joint_names)]
-    fitted = fit_poses(JointTable(motion.times[frames], motion.joint_names, joints[frames]), body.name, sizes, any_bend=True)
-    poses[frames] = fitted.poses
-    joints[frames] = body.points(fitted.poses)
+    poses, joints = refitted(motion, joints, frames, body, sizes)
     joint_sd, pose_sd = motion.joint_sd.copy(), motion.pose_sd.copy()
     joint_sd[frames] = joint_sd[frames][:, other_side(motion.joint_names)]
     pose_sd[frames] = pose_sd[frames][:, other_side(motion.dof_names)]

@@ -44,31 +44,31 @@ class Walk:
 
     def __init__(self) -> None:
         """Nothing is known."""
-        self._steps = deque[Step]()
+        self.steps = deque[Step]()
 
     def add(self, step: Step) -> None:
         """One more frame; earlier than `SECONDS` is forgotten."""
-        self._steps.append(step)
-        while step.time - self._steps[0].time > SECONDS + 1e-6:
-            self._steps.popleft()
+        self.steps.append(step)
+        while step.time - self.steps[0].time > SECONDS + 1e-6:
+            self.steps.popleft()
 
     def forget(self) -> None:
         """Begin again, as after the body was turned round or lost."""
-        self._steps.clear()
+        self.steps.clear()
 
     @property
     def jerked(self) -> float | None:
         """When (s) the body began to turn more quickly than people turn; None if it did not within `TURN_SECONDS`."""
-        now = self._steps[-1]
-        far = [step.time for step in self._steps if now.time - step.time <= TURN_SECONDS and step.facing @ now.facing < np.cos(TURN)]
+        now = self.steps[-1]
+        far = [step.time for step in self.steps if now.time - step.time <= TURN_SECONDS and step.facing @ now.facing < np.cos(TURN)]
         return max(far, default=None)
 
     @property
     def forward(self) -> float:
         """Mean cosine, over `SECONDS`, between the way gone and where the body faces; 0 if it went less than `LEAST_WAY`."""
-        if len(self._steps) < 3 or self._steps[-1].time - self._steps[0].time < 0.8 * SECONDS:
+        if len(self.steps) < 3 or self.steps[-1].time - self.steps[0].time < 0.8 * SECONDS:
             return 0.0
-        way = self._steps[-1].place - self._steps[0].place
+        way = self.steps[-1].place - self.steps[0].place
         length = float(np.linalg.norm(way))
-        facing = np.mean([step.facing for step in self._steps], axis=0)
+        facing = np.mean([step.facing for step in self.steps], axis=0)
         return float(facing @ way) / length if length >= LEAST_WAY else 0.0

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from shadowpuppet.errors import ShadowPuppetError, warn
+from shadowpuppet.errors import ShadowPuppetError, extra_command, warn
 from shadowpuppet.network import (
     MAX_CONNECTIONS,
     REQUEST_SECONDS,
@@ -48,7 +48,7 @@ def check_viser() -> None:
     import importlib.util
 
     if importlib.util.find_spec("viser") is None:
-        raise ShadowPuppetError("--show viewer needs viser: pip install 'shadowpuppet[view]'")
+        raise ShadowPuppetError(f"--show viewer needs viser: {extra_command('view')}")
 
 
 def open_server(listen: str = "127.0.0.1", port: int | None = None) -> viser.ViserServer:

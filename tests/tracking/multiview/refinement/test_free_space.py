@@ -43,7 +43,7 @@ def plain_cost(of, pose, views) -> float:
     middle = out.copy()
     for c, (camera, mask) in enumerate(views):
         field = distance_transform_edt(~mask) - distance_transform_edt(mask)
-        for k, (joint, place, radius) in enumerate(zip(*spheres, strict=True)):
+        for k, (joint, place, radius) in enumerate(zip(*spheres[:3], strict=True)):
             point = T[joint, :, :3] @ place + T[joint, :, 3]
             pixel, depth = camera.project(point[None])[0], (camera.T_camera_world @ [*point, 1])[2]
             if (pixel >= 0).all() and (pixel < camera.size).all() and depth > 0:

@@ -40,6 +40,8 @@ class Spheres(NamedTuple):
     """Centres, joint's frame, metres, of shape (K, 3)."""
     radii: Array
     """Metres, of shape (K,)."""
+    limbs: NDArray[np.int64]
+    """Index of each sphere's limb, of shape (K,)."""
 
 
 class FreeSpace(NamedTuple):
@@ -59,13 +61,14 @@ class FreeSpace(NamedTuple):
 
 def spheres_in(limbs: Limbs) -> Spheres:
     """Spheres along each limb's axis, from its start to its end."""
-    joints, places, radii = [], [], []
+    joints, places, radii, which = [], [], [], []
     for s, length in enumerate(limbs.lengths):
         for share in np.linspace(0, 1, max(2, round(length / SPHERE_SPACING) + 1)):
+            which.append(s)
             joints.append(limbs.joints[s])
             places.append(limbs.starts[s] + limbs.rotations[s] @ (share * np.array([*limbs.shears[s], length])))
             radii.append(RADIUS_SHARE * ((1 - share) * limbs.radii[s, 0] + share * limbs.radii[s, 1]).min())
-    return Spheres(np.array(joints), np.array(places), np.array(radii))
+    return Spheres(np.array(joints), np.array(places), np.array(radii), np.array(which))
 
 
 def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
