@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.calibration.agreement import plain_values
+from shadowpuppet.calibration.clock_offset import QUANTILE
 from shadowpuppet.calibration.epipolar_tangency import tangent_angles
 from shadowpuppet.calibration.silhouettes import Outline, Row, outlines_of
 from shadowpuppet.camera.camera import Camera
@@ -31,9 +32,9 @@ LEAST_MOTION = 2.0
 alike in no two pictures, then biases a shift by most of a frame."""
 LEAST_SCORE = 2.0
 """Standard errors by which two signals must be more alike, at their best shift, than chance makes them at the best of all shifts tried."""
-QUANTILE, NOISE_FACTOR = 1.645, 1.56
-"""Half-width of a 90 % interval over the standard deviation, and a factor on the variance from noise: the trimmed minimum is less exact
-than least squares would be; chosen on simulated signals, of whose true shifts the intervals then hold 86 to 91 %."""
+NOISE_FACTOR = 1.56
+"""Factor on the variance from noise: the trimmed minimum is less exact than least squares would be; chosen on simulated signals, of whose
+true shifts the intervals then hold 86 to 91 %."""
 SOLVER_ROUNDS = 30
 """Rounds of iteratively reweighted least squares for all cameras."""
 
