@@ -82,7 +82,8 @@ def test_points_belong_to_the_nearest_body():
 def test_evidence_is_divided_again_among_other_bodies():
     points = np.array([[-0.4, 0, 1.0], [0.4, 0, 1.0]])
     mask = block((10, 22), (40, 52))
-    divided = Division({1: drawn(10, 22, -0.4), 2: drawn(40, 52, 0.4)}, set(), SurfacePoints(points, points, np.ones(2), np.arange(2)), [mask])
+    surface = SurfacePoints(points, points, np.ones(2), np.arange(2))
+    divided = Division({1: drawn(10, 22, -0.4), 2: drawn(40, 52, 0.4)}, set(), surface, [mask])
     moved = divided.with_bodies({2: drawn(40, 52, 3.0)})
     assert moved.points_of(1).cameras.tolist() == [0]
     assert moved.points_of(2).cameras.tolist() == []
