@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -156,7 +155,7 @@ class Group:
             lost = share.state.status == "lost"
             member.lost_since = (time if member.lost_since is None else member.lost_since) if lost else None
         with ThreadPoolExecutor(max(min(len(people), usable_cores()), 1), "people") as pool:
-            deque(pool.map(lambda number: self._face_the_way(self.members[number - 1], time), people), 0)
+            list(pool.map(lambda number: self._face_the_way(self.members[number - 1], time), people))  # raises what one of them raised
         if time >= self.due:
             self.due = time + LOOK_SECONDS
             self._look(time, points, masks, images)
