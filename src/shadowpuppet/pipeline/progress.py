@@ -34,6 +34,8 @@ STAGES = ("decode", "segment", "wait", "hull", "track", "doubt", "write")
 """Stages of a frame. Several cameras' films are decoded and segmented in parallel: their sum is not what the tracker waits for, `wait`."""
 FALLBACK_RATE = 25.0
 """Frames/s of an overlay if the film does not state its rate."""
+FEW_CAMERAS = 3
+"""Number of cameras up to which a line of progress names them."""
 MANY_LOST = 0.1
 """Share of lost frames above which a warning is given."""
 
@@ -63,10 +65,19 @@ class Steps:
         with self.lock:
             self.now = self.now if camera else {}
             self.now[camera or ""] = what
-            told = "; ".join(f"camera {name}: {step}" if name else step for name, step in self.now.items() if step)
+            doing = dict[str, list[str]]()
+            for name, step in self.now.items():
+                if step:
+                    doing.setdefault(step, []).append(name)
+            told = "; ".join(f"{_listed(cameras)}: {step}" if all(cameras) else step for step, cameras in doing.items())
             done = sum(not step for step in self.now.values())
-            films = f" ({done} of {len(self.names)} films done)" if camera and len(self.names) > 1 else ""
+            films = f", {done}/{len(self.names)} films" if camera and len(self.names) > 1 else ""
             self.listener.begin(f"looking{films}: {told}" if told else f"looking{films}")
+
+
+def _listed(cameras: Sequence[str]) -> str:
+    """The names of cameras, or their number: a line of progress should fit in a terminal."""
+    return ", ".join(cameras) if len(cameras) <= FEW_CAMERAS else f"{len(cameras)} cameras"
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,9 +45,9 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT, hi
     steps("reading the film", footage.camera.name)
     sample = take_sample(footage, options.masks, longest, opening)
     empty = "learning" if footage.view.background is not None else "recovering"
-    steps(f"{empty} the empty scene, making silhouettes" if not options.masks else "reading silhouettes", footage.camera.name)
+    steps(f"{empty} the scene" if not options.masks else "reading silhouettes", footage.camera.name)
     silhouettes, runs = _made(footage, sample, options, None if hint is None else hint.added)
-    steps("judging the silhouettes", footage.camera.name)
+    steps("judging masks", footage.camera.name)
     silhouettes, runs = _with_added(footage, sample, silhouettes, runs, options, hint)
     silhouettes = silhouettes.without_clutter([mask for run in runs for mask in run])
     if silhouettes.clutter is not None:
