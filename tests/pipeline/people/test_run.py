@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from solids import Ellipsoid, ring, seen_by
 
-from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError
+from shadowpuppet.errors import NOTED, FormatError, SettingsError, ShadowPuppetError
+from shadowpuppet.geometry import rigid, rotation_about
 from shadowpuppet.io.checkpoint import FRAMES as EXACT
 from shadowpuppet.io.checkpoint import STATE
 from shadowpuppet.io.files.lock import LOCK
@@ -23,7 +24,6 @@ from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline import progress
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.people.census import people_in, sampled_sets, take_census
-from shadowpuppet.pipeline.people.fitting import views_of
 from shadowpuppet.pipeline.people.group import first_people
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people, matched_truths
 from shadowpuppet.pipeline.prepare import MULTIVIEW
@@ -31,6 +31,7 @@ from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.track import run as track_run
 from shadowpuppet.tracking.people.figures import find_people
+from shadowpuppet.tracking.people.views import views_of
 
 FRAMES, KILLED = 6, (1, 4)
 
@@ -94,6 +95,26 @@ def run(tracked, tmp_path_factory):
         patch.setattr(progress, "CHECKPOINT_SECONDS", 0.0)
         patch.setattr(progress, "CHECKPOINT_COST", 0.0)
         return tracked(folder, Kills(folder))
+
+
+def surveyed(folder: Path, rig: list, masks: list):
+    options = make_options({"masks": True})
+    return MULTIVIEW.survey(open_rig(made_rig.write(folder / "recording", rig, masks), options), options).look
+
+
+def test_cameras_that_agree_about_each_person_are_not_doubted(seen, tmp_path):
+    """All people together are taller and wider than a person: that says nothing about the calibration."""
+    look = surveyed(tmp_path, *seen)
+    assert [doubt.short for doubt in look.doubts if doubt.weight != NOTED] == []
+    assert 1.5 < look.agreement.height < 2.0
+
+
+@pytest.mark.parametrize("degrees", [3.0, 12.0])
+def test_a_camera_that_was_turned_is_named_by_several_people(seen, tmp_path, degrees):
+    rig, masks = seen
+    turn = rigid(rotation_about([0, 1, 0], np.radians(degrees)), np.zeros(3))
+    turned = [*rig[:2], replace(rig[2], T_camera_world=turn @ rig[2].T_camera_world), rig[3]]
+    assert any("cam3" in doubt.short for doubt in surveyed(tmp_path, turned, masks).doubts)
 
 
 def test_each_has_a_run_of_their_own(run):

@@ -67,6 +67,15 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT, hi
     return found
 
 
+def of_several(film: FilmSurvey) -> FilmSurvey:
+    """The survey of a film that shows several people: silhouettes of all of them, and what these say of the film."""
+    silhouettes = film.silhouettes.of_several()
+    runs = [[silhouettes(frame) for frame in run] for run in film.sample.runs]
+    masks = [mask for run in runs for mask in run]
+    values = film.values | {"exact_overlap": mean_overlap(masks, film.exact), "condition": condition_of(silhouettes, film.sample, runs)}
+    return film._replace(silhouettes=silhouettes, masks=masks, values=values)
+
+
 def _made(footage: Footage, sample: Sample, options: Options, added: AddedParts | None) -> tuple[Silhouettes, list[list[Mask]]]:
     """Silhouettes, given what was added to the empty scene, and their masks of the sample's runs."""
     silhouettes = learn_silhouettes(footage, sample, options, added=added)

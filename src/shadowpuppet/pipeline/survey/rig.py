@@ -8,20 +8,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from shadowpuppet.calibration.agreement import agreement
+from shadowpuppet.calibration.agreement import SETS_COMPARED, Agreement, agreement
 from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
+from shadowpuppet.geometry import evenly_spread
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, RigLook, Survey
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.people.census import later_sets, sampled_sets, take_census
+from shadowpuppet.pipeline.people.census import Census, later_sets, sampled_sets, take_census
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.survey.cautions import GOOD, clutter_cautions, condition_cautions, recovery_cautions, unlike_ready
-from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, survey_film
+from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, of_several, survey_film
 from shadowpuppet.pipeline.survey.opening import OPENING, first_seconds, opening_of
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import usable_cores
+from shadowpuppet.tracking.people.views import View, views_of
 
 SILHOUETTES_OR_CAMERAS = "silhouettes do not fit together: film the empty scene, or calibrate"
 """Ten words on an agreement that an empty scene recovered from the film may have spoiled."""
@@ -46,13 +48,15 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
         seen = max((film.sample.times[-1] for film in films if len(film.sample.times)), default=0.0)
         census = take_census(rig.cameras, sampled_sets([film.sample for film in films], wide), later_sets(rig, wide, float(seen)))
     several = census.number if census is not None and census.number > 1 else 0
-    silhouettes = wide if several else silhouettes
+    if several:
+        films = [of_several(film) for film in films]
+        silhouettes = tuple(film.silhouettes for film in films)
     steps("silhouettes of the first seconds in all films")
     first = first_seconds(rig, silhouettes, [film.sample for film in films], opening, options.masks)
     steps("do the cameras agree")
-    step = float(np.median(np.diff(first.times))) if len(first.times) > 1 else np.nan
+    agree = agreement_of_people(rig, census, first) if census is not None and several else agreement_of_one(rig, first)
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
-                   agreement=agreement(rig.cameras, first.masks, step))
+                   agreement=agree)
     refusal = _rig_refusal(look, first)
     recovered = frozenset(camera.name for camera, each in zip(look.cameras, silhouettes, strict=True) if each.recovered is not None)
     doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
@@ -61,6 +65,27 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
                                  f"{several} people: each is tracked", NOTED))
     look = replace(look, refusal=refusal, doubts=() if refusal else tuple(doubts))
     return Survey(rig, silhouettes, silhouettes, first, look, census)
+
+
+def agreement_of_one(rig: Rig, first: FirstSeconds) -> Agreement:
+    """Do the cameras agree about the person of the first seconds?"""
+    step = float(np.median(np.diff(first.times))) if len(first.times) > 1 else np.nan
+    return agreement(rig.cameras, first.masks, step)
+
+
+def agreement_of_people(rig: Rig, census: Census, first: FirstSeconds) -> Agreement:
+    """Do the cameras agree about each of several people, in the views that show them apart? Of all together one camera may see more than
+    another; all together tell of a camera that shows nobody where the others do."""
+    rows = list[View]()
+    for n in evenly_spread(len(first.masks), SETS_COMPARED):
+        masks = first.masks[n]
+        figures = census.people(masks)
+        each = (views_of(census.floor, one, [other for other in figures if other is not one], masks) for one in figures)
+        rows += [row for row in each if sum(mask is not None for mask in row) > 1]
+    found, together = agreement(rig.cameras, rows), agreement_of_one(rig, first)
+    if 2 * len(rows) < SETS_COMPARED:  # one person in a calibration of the wrong unit may be taken for several
+        return together
+    return replace(found, apart=tuple(whole if one is None else one for one, whole in zip(found.apart, together.apart, strict=True)))
 
 
 def _shows_person(film: FilmSurvey) -> bool:

@@ -131,14 +131,16 @@ def film_condition(segmenter: Segmenter, runs: Sequence[Sequence[tuple[float, Im
                    masks: Sequence[Sequence[NDArray[np.bool_]]] | None = None) -> FilmCondition:
     """The condition of a film's sampled frames, in `runs` of consecutive ones, each with its time (s) and picture (H, W, 3) or (H, W).
 
-    masks: the person's masks (H, W) in them, for motion blur.
+    masks: the people's masks (H, W) in them: for motion blur, and as what hides the empty scene.
     """
     correction = segmenter.correction or Correction(np.zeros(segmenter.background.image_shape, np.uint8))
     correction = replace(correction, detail=None)
     frames = [frame for run in runs for frame in run]
     each = [[correction(image) for _, image in run] for run in runs]
     corrected = [[frame.image for frame in run] for run in each]
-    states = [_state(correction, image, frame) for (_, image), frame in zip(frames, itertools.chain(*each))]
+    people = [None] * len(frames) if masks is None else [mask for run in masks for mask in run]
+    states = [_state(correction, image, frame, mask)
+              for (_, image), frame, mask in zip(frames, itertools.chain(*each), people, strict=True)]
     gains = np.concatenate([state.gains for state in states])
     moved = np.array([state.moved for state in states])
     still = np.flatnonzero(moved == 0)
@@ -153,12 +155,12 @@ def film_condition(segmenter: Segmenter, runs: Sequence[Sequence[tuple[float, Im
     )  # fmt: skip
 
 
-def _state(correction: Correction, image: Image, frame: Corrected) -> _State:
+def _state(correction: Correction, image: Image, frame: Corrected, people: NDArray[np.bool_] | None) -> _State:
     registration = correction.registration
     if registration is None:
         return _State(frame.gains, 0.0, True)
     moved = 0.0 if frame.movement is None else registration.pixels(frame.movement)
-    return _State(frame.gains, moved, registration.matches(image, frame.movement))
+    return _State(frame.gains, moved, registration.matches(image, frame.movement, people))
 
 
 def _changes(runs: Sequence[Sequence[Image]]) -> tuple[float | None, float | None]:

@@ -37,6 +37,8 @@ STILL = 0.4
 UNLIKE, SEARCHED_FROM = 0.9, 0.6
 """Median difference of points over their median value: from which on picture and scene do not match, and a movement is searched for. Noise
 and light reach 0.7, pictures that have nothing in common 1.4, a nudge in a room with few details 0.8."""
+LEAST_SHOWN = 0.05
+"""Least share of the points that people leave for a frame to show the scene."""
 BETTER = 0.6
 """Greatest such difference under a movement, over that without it: compression leaves 0.65 under a movement that is none."""
 PIECE, BENT = 64, 0.03
@@ -107,12 +109,27 @@ class Registration:
             return True
         return self.pixels(matrix_of(solved_step(points, difference, typical, NONE, rigid=True))) >= margin * STILL
 
-    def matches(self, image: Image, movement: Homography | None) -> bool:
-        """Whether a frame under a movement looks like the scene; true if the scene has too little texture to tell."""
+    def matches(self, image: Image, movement: Homography | None, people: NDArray[np.bool_] | None = None) -> bool:
+        """Whether a frame under a movement looks like the scene where no people (H, W) hide it; true if the scene has too little texture
+        to tell."""
         if self._levels is None:
             return True
         points = self._levels[0]
-        return _unlike(points, compared(points, self._reduced(image), NONE if movement is None else movement)) < UNLIKE
+        difference, values = compared(points, self._reduced(image), NONE if movement is None else movement), points.value
+        if people is not None:
+            shown = ~self._about(people)[points.places[1], points.places[0]]
+            if np.count_nonzero(shown) < LEAST_SHOWN * len(values):
+                return False
+            difference, values = difference[shown], values[shown]
+        return median_of(np.abs(difference)) / median_of(np.abs(values)) < UNLIKE
+
+    def _about(self, people: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Pixels of the reduced picture whose values a mask (H, W) of people changes."""
+        import cv2
+
+        assert self._levels is not None
+        small = cv2.resize(people.view(np.uint8), self._reduced_grey(self.scene).shape[::-1], interpolation=cv2.INTER_AREA)
+        return np.asarray(cv2.dilate(small, np.ones((2 * round(COARSE) + 1,) * 2, np.uint8)), np.uint8) > 0
 
     def pixels(self, movement: Homography) -> float:
         """The greatest displacement of a corner by a movement, pixels of the frame."""
