@@ -48,7 +48,7 @@ def mirrored(skeleton: Skeleton, poses: np.ndarray) -> np.ndarray:
 # Counts and sizes -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("name", "dofs", "parts", "soles"), [("anatomical", 32, 17, SOLES), ("cylinders", 25, 10, ())])
+@pytest.mark.parametrize(("name", "dofs", "parts", "soles"), [("anatomical", 32, 18, SOLES), ("cylinders", 25, 10, ())])
 def test_as_many_dof_parts_and_joints_as_said(name, dofs, parts, soles):
     body = BODY[name]
     assert (len(body.skeleton.dofs), len(body.parts), limbs_of(body).parts) == (dofs, parts, body.parts)
