@@ -77,6 +77,20 @@ def test_the_shanks_middle_lies_outside_the_bone():
         assert (out * np.array([limbs.starts[n, 1], limbs.ends[n, 1]]) > 0.004).all()
 
 
+def test_the_shoulders_slope_from_the_neck_to_the_joints_and_move_with_the_chest():
+    body = BODY["anatomical"]
+    limbs = limbs_of(body)
+    left, right = (limbs.parts.index(f"{side}_shoulder") for side in ("left", "right"))
+    joints = body.points(np.zeros((1, 32)), names=["left_shoulder", "neck"])[0]
+    chest = body.skeleton.forward(np.zeros((1, 32)))[0][body.skeleton.joint_index("chest"), :, 3]
+    assert {int(limbs.joints[n]) for n in (left, right)} == {body.skeleton.joint_index("chest")}
+    np.testing.assert_allclose(limbs.ends[left] + chest, joints[0])
+    np.testing.assert_allclose([limbs.ends[left], limbs.starts[left]], np.array([limbs.starts[right], limbs.ends[right]]) * [1, -1, 1])
+    way = limbs.starts[left] - limbs.ends[left]
+    np.testing.assert_allclose(way[2] / -way[1], 0.5)
+    assert limbs.starts[left, 2] + chest[2] < joints[1, 2]  # its axis begins below the base of the neck
+
+
 def measures(body: Body) -> np.ndarray:
     """All lengths that a body is made of, as one array."""
     offsets, places = [joint.offset for joint in body.skeleton.joints], [place for _, place in body.landmarks.values()]
