@@ -131,6 +131,14 @@ def test_a_run_killed_anywhere_goes_on_to_the_same_result(run, tracked, frames):
     assert len(made.images(left / "overlay.mp4")) == FRAMES
 
 
+@pytest.mark.parametrize("threads", ["1", "7"])
+def test_cores_change_nothing(run, tracked, tmp_path, monkeypatch, threads):
+    monkeypatch.setenv("SHADOWPUPPET_THREADS", threads)
+    other = tracked(tmp_path / "run")
+    for name in ("people.csv", "person-1/motion.npz", "person-2/joints.csv"):
+        assert (other.folder / name).read_bytes() == (run.folder / name).read_bytes(), name
+
+
 def test_what_a_run_cannot_go_on_from(run, tracked, tmp_path):
     left = shutil.copytree(run.folder.with_name("killed-4-spare"), tmp_path / "left")
     with pytest.raises(ShadowPuppetError, match=r"cannot go on as another one: settings\.seed was 0, and is 4"):

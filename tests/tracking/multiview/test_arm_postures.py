@@ -60,6 +60,14 @@ def test_hanging_arms_are_usual_those_behind_the_back_rare_and_nothing_is_imposs
     assert far.max() < 8.5
 
 
+def test_the_kernel_is_the_density_of_both_arms(rng):
+    joints = joints_of(actor.stance(BODY.skeleton)) + 0.1 * rng.normal(size=(40, 8, 3))
+    postures = usual_arm_postures()
+    naive = postures.rarity(arm_directions(joints).reshape(-1, 6)).reshape(-1, 2).sum(1)
+    np.testing.assert_allclose(postures.rarity_of_both(joints), naive, rtol=1e-9, atol=1e-9)
+    assert np.ptp(naive) > 1
+
+
 def test_the_table_is_a_mixture_with_its_source():
     found = usual_arm_postures()
     assert found.weights.sum() == pytest.approx(1, abs=1e-3)

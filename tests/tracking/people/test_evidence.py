@@ -9,7 +9,7 @@ import pytest
 
 from shadowpuppet.camera.rasterize import pack
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
-from shadowpuppet.tracking.people.evidence import Drawn, PersonObservation, ignored_pixels, nearest_to, own_masks, picked
+from shadowpuppet.tracking.people.evidence import Division, Drawn, PersonObservation, ignored_pixels, own_masks
 from shadowpuppet.tracking.people.tracker import explained, touching
 from shadowpuppet.tracking.silhouette_cost import Observation
 
@@ -73,11 +73,36 @@ def test_no_mask_no_evidence():
 def test_points_belong_to_the_nearest_body():
     one, other = drawn(0, 1, -0.4), drawn(0, 1, 0.4)
     points = np.array([[-0.5, 0, 1.0], [-0.1, 0, 1.0], [0.1, 0, 1.0], [0.5, 0, 1.0], [3.0, 0, 1.0]])
-    surface = SurfacePoints(points, points, np.ones(5), np.arange(5))
-    assert nearest_to(one, [other], surface).tolist() == [True, True, False, False, False]
-    assert nearest_to(other, [one], surface).tolist() == [False, False, True, True, False]
-    assert picked(surface, nearest_to(one, [other], surface)).cameras.tolist() == [0, 1]
-    assert nearest_to(one, [], SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))).tolist() == []
+    divided = Division({1: one, 2: other}, set(), SurfacePoints(points, points, np.ones(5), np.arange(5)), [None])
+    assert [divided.points_of(n).cameras.tolist() for n in (1, 2)] == [[0, 1], [2, 3]]
+    alone = Division({1: one, 2: other}, {2}, divided.points, [None])  # a lost person's body explains nothing
+    assert alone.points_of(1).cameras.tolist() == [0, 1, 2]
+
+
+def test_evidence_is_divided_again_among_other_bodies():
+    points = np.array([[-0.4, 0, 1.0], [0.4, 0, 1.0]])
+    mask = block((10, 22), (40, 52))
+    surface = SurfacePoints(points, points, np.ones(2), np.arange(2))
+    divided = Division({1: drawn(10, 22, -0.4), 2: drawn(40, 52, 0.4)}, set(), surface, [mask])
+    moved = divided.with_bodies({2: drawn(40, 52, 3.0)})
+    assert moved.points_of(1).cameras.tolist() == [0]
+    assert moved.points_of(2).cameras.tolist() == []
+    assert moved.distances[1] is divided.distances[1]  # computed once
+    own, (ignored,) = divided.of(1)
+    assert own.cameras.tolist() == [0]
+    assert ignored is not None
+    assert ignored[10:20, 20:26].all()
+    (seen,) = divided.share(1)[1]
+    assert seen is not None
+    assert not (seen & block((40, 52))).any()
+
+
+def test_distances_are_those_of_the_nearest_sphere(rng):
+    body = Drawn((), rng.normal(size=(20, 3)), rng.uniform(0.05, 0.2, 20))
+    points = rng.normal(size=(50, 3))
+    naive = (np.linalg.norm(points[:, None] - body.centres, axis=-1) - body.radii).min(1)
+    np.testing.assert_allclose(body.distances(points), naive, atol=1e-12)
+    assert body.distances(np.zeros((0, 3))).shape == (0,)
 
 
 @pytest.mark.parametrize(("apart", "numbers"), [(0.4, [1, 2]), (2.0, [])])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from solids import Ellipsoid, ring, seen_by
 
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
-from shadowpuppet.tracking.people.figures import EMPTY, ROWS, Figure, _score, drawn, find_floor, find_people, telling
+from shadowpuppet.tracking.people.figures import EMPTY, NEW, ROWS, Figure, _height, _score, drawn, find_floor, find_people, telling
 from shadowpuppet.tracking.people.floor import ASIDE, HEIGHTS, LEGS, MOST_PLACES, POINTS, TRUNK, figure_points, floor_under, pixel_index
 from shadowpuppet.tracking.people.presence import Followed, counted, follow
 
@@ -169,6 +169,14 @@ def test_the_floor_is_found_though_the_hull_reaches_below_it():
     masks = seen(made, body(-1, 0.3), body(1, 0))
     points = np.concatenate([VisualHull(made).points(masks).points, [[0.0, 0, -0.8]] * 40])
     assert find_floor(made, points, [masks]).level == pytest.approx(0.0, abs=0.06)
+
+
+def test_a_figure_is_as_tall_as_its_silhouette_whatever_height_was_tried(rig):
+    made, floor = rig
+    masks = seen(made, body(0, 0, 1.95))
+    state = np.array([mask[::2, ::2].ravel() * NEW for mask in masks], np.uint8)
+    for about in (1.3, 1.45, 1.75, 1.9):
+        assert _height(floor, np.zeros(2), about, state) == pytest.approx(1.95, abs=0.05)
 
 
 @settings(max_examples=10, deadline=None)

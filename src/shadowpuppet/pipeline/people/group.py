@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -13,6 +14,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.pipeline.person_rig import HullObservation, MultiviewSubject
+from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState
 from shadowpuppet.tracking.people.appearance import Colours, apart_from, colours_of_body, colours_of_figure, dressed_parts
@@ -152,7 +154,8 @@ class Group:
             member.state, member.share = share.state, share
             lost = share.state.status == "lost"
             member.lost_since = (time if member.lost_since is None else member.lost_since) if lost else None
-            self._face_the_way(member, time)
+        with ThreadPoolExecutor(max(min(len(people), usable_cores()), 1), "people") as pool:
+            list(pool.map(lambda number: self._face_the_way(self.members[number - 1], time), people))  # raises what one of them raised
         if time >= self.due:
             self.due = time + LOOK_SECONDS
             self._look(time, points, masks, images)

@@ -16,6 +16,7 @@ from importlib import resources
 import numpy as np
 
 from shadowpuppet.geometry import Array, unit
+from shadowpuppet.jit import device, kernel
 
 TABLE = "arm_postures.toml"
 """The mixture, as `benchmarks/fit_arm_postures.py` writes it."""
@@ -25,6 +26,8 @@ UNKNOWN = 0.1
 """Share of the uniform distribution."""
 THICKNESS = 0.12
 """Standard deviation of directions' lengths that the uniform distribution is given: as the least one of the mixture's."""
+UNIFORM = float(np.log(UNKNOWN) - 2 * np.log(4 * np.pi) - np.log(2 * np.pi * THICKNESS**2))
+"""Log density of the uniform distribution's share, on two spheres of some thickness."""
 MIRRORED = np.array([-1.0, 1, 1, -1, 1, 1])
 
 
@@ -62,8 +65,15 @@ class ArmPostures:
         """Log density (N,) of directions (N, 6)."""
         off, (precisions, scales) = directions[:, None] - self.means, self._constants
         normal = -0.5 * (np.einsum("nki,kij,nkj->nk", off, precisions, off, optimize=True) + scales) + np.log(self.weights * (1 - UNKNOWN))
-        uniform = np.log(UNKNOWN) - 2 * np.log(4 * np.pi) - np.log(2 * np.pi * THICKNESS**2)  # on two spheres of some thickness
-        return np.logaddexp(np.logaddexp.reduce(normal, axis=1), uniform)
+        return np.logaddexp(np.logaddexp.reduce(normal, axis=1), UNIFORM)
+
+    def rarity_of_both(self, joints: Array) -> Array:
+        """How rare both arms' postures are together (N,), from `JOINTS` (N, 8, 3): `rarity` of `arm_directions`, summed, by a kernel."""
+        out = np.empty(len(joints))
+        precisions, scales = self._constants
+        offsets = np.log(self.weights * (1 - UNKNOWN)) - 0.5 * scales
+        _rarities(joints, self.means, precisions, offsets, UNIFORM, self._greatest, out)
+        return out
 
     @cached_property
     def _constants(self) -> tuple[Array, Array]:
@@ -83,3 +93,42 @@ def usual_arm_postures() -> ArmPostures:
     table = tomllib.loads(resources.files("shadowpuppet.tracking.multiview").joinpath(TABLE).read_text("utf-8"))
     parts = table["components"]
     return ArmPostures(*(np.array([part[name] for part in parts], float) for name in ("weight", "mean", "covariance")))
+
+
+@kernel
+def _rarities(joints, means, precisions, offsets, uniform, greatest, out):  # pragma: no cover
+    """Fill `out` (N,) as `ArmPostures.rarity_of_both`; `offsets` (K,): each component's log density at its mean."""
+    for n in range(joints.shape[0]):
+        at = joints[n]
+        ux, uy, uz = _unit(at[1, 0] - at[0, 0], at[1, 1] - at[0, 1], at[1, 2] - at[0, 2])
+        ax, ay, az = at[5, 0] - at[2, 0], at[5, 1] - at[2, 1], at[5, 2] - at[2, 2]
+        along = ax * ux + ay * uy + az * uz
+        rx, ry, rz = _unit(ax - along * ux, ay - along * uy, az - along * uz)
+        fx, fy, fz = uy * rz - uz * ry, uz * rx - ux * rz, ux * ry - uy * rx
+        out[n] = 0.0
+        for side in range(2):
+            j, mirrored = 2 + 3 * side, 2.0 * side - 1.0
+            x, y, z = _unit(at[j + 1, 0] - at[j, 0], at[j + 1, 1] - at[j, 1], at[j + 1, 2] - at[j, 2])
+            a, b, c = mirrored * (rx * x + ry * y + rz * z), fx * x + fy * y + fz * z, ux * x + uy * y + uz * z
+            x, y, z = _unit(at[j + 2, 0] - at[j + 1, 0], at[j + 2, 1] - at[j + 1, 1], at[j + 2, 2] - at[j + 1, 2])
+            d, e, f = mirrored * (rx * x + ry * y + rz * z), fx * x + fy * y + fz * z, ux * x + uy * y + uz * z
+            density = uniform
+            for k in range(means.shape[0]):
+                P, m = precisions[k], means[k]
+                p, q, r, s, t, u = a - m[0], b - m[1], c - m[2], d - m[3], e - m[4], f - m[5]
+                away = (p * (P[0, 0] * p + 2 * (P[0, 1] * q + P[0, 2] * r + P[0, 3] * s + P[0, 4] * t + P[0, 5] * u))
+                        + q * (P[1, 1] * q + 2 * (P[1, 2] * r + P[1, 3] * s + P[1, 4] * t + P[1, 5] * u))
+                        + r * (P[2, 2] * r + 2 * (P[2, 3] * s + P[2, 4] * t + P[2, 5] * u))
+                        + s * (P[3, 3] * s + 2 * (P[3, 4] * t + P[3, 5] * u))
+                        + t * (P[4, 4] * t + 2 * P[4, 5] * u) + u * P[5, 5] * u)  # fmt: skip
+                one = offsets[k] - 0.5 * away
+                high, low = max(density, one), min(density, one)
+                density = high + np.log1p(np.exp(low - high))
+            out[n] += max(greatest - density, 0.0)
+
+
+@device
+def _unit(x, y, z):  # pragma: no cover
+    """A vector of length 1 that way."""
+    length = max(np.sqrt(x * x + y * y + z * z), 1e-12)
+    return x / length, y / length, z / length

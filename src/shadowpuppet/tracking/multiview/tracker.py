@@ -15,7 +15,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview import pose_search
-from shadowpuppet.tracking.multiview.arm_postures import JOINTS, arm_directions, usual_arm_postures
+from shadowpuppet.tracking.multiview.arm_postures import JOINTS, usual_arm_postures
 from shadowpuppet.tracking.multiview.local_search import LocalSearch
 from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, half_size
 from shadowpuppet.tracking.multiview.odd_camera import adapted, odd_one, suspects
@@ -196,8 +196,7 @@ class MultiviewTracker:
 
     def rarity_of_arms(self, poses: Array) -> Array:
         """How rare the postures of both arms are among people, together (N,), of poses (N, D)."""
-        directions = arm_directions(self.body.points(poses, names=JOINTS))
-        return usual_arm_postures().rarity(directions.reshape(-1, 6)).reshape(-1, 2).sum(1)
+        return usual_arm_postures().rarity_of_both(self.body.points(poses, names=JOINTS))
 
     def refine(self, observation: MultiviewObservation, last: Array) -> Refine | None:
         """The function that refines poses (N, D); `last`: the last estimate (D,)."""

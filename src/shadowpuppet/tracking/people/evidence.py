@@ -7,7 +7,9 @@ that is nearest.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +20,8 @@ from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import count
 from shadowpuppet.geometry import Array
+from shadowpuppet.jit import kernel
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation, half_size
-from shadowpuppet.tracking.multiview.refinement.free_space import spheres_in
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.unexplained import near
@@ -44,12 +46,9 @@ class Drawn(NamedTuple):
 
     def distances(self, points: Array) -> Array:
         """Distances (P,), metres, of points (P, 3) from the body; negative inside."""
-        from scipy.spatial import KDTree
-
-        if not len(points):
-            return np.zeros(0)
-        away, which = KDTree(self.centres).query(points)
-        return np.asarray(away) - self.radii[which]
+        out = np.empty(len(points))
+        _distances(np.ascontiguousarray(points, float), self.centres, self.radii, out)
+        return out
 
 
 class PersonObservation(MultiviewObservation):
@@ -67,9 +66,7 @@ class PersonObservation(MultiviewObservation):
 
 def draw_person(tracker: MultiviewTracker, pose: Array) -> Drawn:
     """A person in a pose (D,)."""
-    limbs = tracker.body.limbs
-    assert limbs is not None
-    spheres = spheres_in(limbs)
+    spheres = tracker.refiner.spheres
     centres = tracker.body.skeleton.points(pose[None], spheres.joints, spheres.places)[0]
     return Drawn(tuple(picture.mask(pose) for picture in tracker.views.pictures), centres, spheres.radii)
 
@@ -82,13 +79,54 @@ def predicted(body: Body, state: MultiviewState) -> Array:
     return pose
 
 
-def nearest_to(drawn: Drawn, others: Sequence[Drawn], surface: SurfacePoints) -> NDArray[np.bool_]:
-    """Whether each surface point (P,) is near a person, and nearer to them than to the others."""
-    own = drawn.distances(surface.points)
+def _nearest(own: Array, others: Sequence[Array]) -> NDArray[np.bool_]:
+    """Whether each surface point (P,) is near a person, and nearer to them than to the others; distances (P,), metres, from each."""
     mine = own < FAR
     for other in others:
-        mine &= own <= other.distances(surface.points)
+        mine &= own <= other
     return mine
+
+
+@dataclass(frozen=True, eq=False)
+class Division:
+    """A frame's evidence, divided among the bodies drawn in it."""
+
+    drawn: Mapping[int, Drawn]
+    """The people's bodies, by number."""
+    lost: Set[int]
+    """Numbers of the people whose bodies explain nothing."""
+    points: SurfacePoints
+    """Surface points of all people together."""
+    masks: Sequence[Mask | None]
+    """Silhouettes (H, W) of all people together, one per camera."""
+    known: Mapping[int, Array] = field(default_factory=dict)
+    """Distances (P,), metres, of the surface points from some of the bodies."""
+
+    @cached_property
+    def distances(self) -> dict[int, Array]:
+        """Distances (P,), metres, of the surface points from each body."""
+        return {n: self.known[n] if n in self.known else one.distances(self.points.points) for n, one in self.drawn.items()}
+
+    def others(self, n: int) -> list[int]:
+        """Numbers of the other people whose bodies explain something."""
+        return [m for m in self.drawn if m != n and m not in self.lost]
+
+    def points_of(self, n: int) -> SurfacePoints:
+        """The surface points nearest to a person."""
+        return picked(self.points, _nearest(self.distances[n], [self.distances[m] for m in self.others(n)]))
+
+    def of(self, n: int) -> tuple[SurfacePoints, list[Mask | None]]:
+        """A person's surface points, and the pixels (H / 2, W / 2) of each camera that say nothing of them."""
+        return self.points_of(n), ignored_pixels(self.drawn[n], [self.drawn[m] for m in self.others(n)], self.masks)
+
+    def share(self, n: int) -> tuple[SurfacePoints, list[Mask | None]]:
+        """A person's surface points and silhouettes (H, W), one per camera."""
+        return self.points_of(n), own_masks(self.drawn[n], [self.drawn[m] for m in self.others(n)], self.masks)
+
+    def with_bodies(self, drawn: Mapping[int, Drawn]) -> Division:
+        """The same evidence, divided among other bodies where there are some in `drawn`."""
+        known = {n: away for n, away in self.distances.items() if n not in drawn}
+        return Division({**self.drawn, **drawn}, self.lost, self.points, self.masks, known)
 
 
 def picked(surface: SurfacePoints, which: NDArray[np.bool_]) -> SurfacePoints:
@@ -134,3 +172,15 @@ def own_masks(drawn: Drawn, others: Sequence[Drawn], masks: Sequence[Mask | None
         wide = (out & ~body).repeat(2, 0).repeat(2, 1)[: mask.shape[0], : mask.shape[1]]
         found.append(mask & ~wide)
     return found
+
+
+@kernel
+def _distances(points, centres, radii, out):  # pragma: no cover
+    """Fill `out` (P,) with the least distances of points (P, 3) from spheres."""
+    for p in range(points.shape[0]):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        least = np.inf
+        for k in range(radii.size):
+            dx, dy, dz = x - centres[k, 0], y - centres[k, 1], z - centres[k, 2]
+            least = min(least, np.sqrt(dx * dx + dy * dy + dz * dz) - radii[k])
+        out[p] = least

@@ -40,6 +40,10 @@ NONE, NEW, KNOWN = 0, 1, 2
 
 TRIED_REACH, TRIED_NEAR = 0.3, 0.5
 """Distance (m) beyond the surface points to which floors reach that are only tried, and greatest distance of their places from a point."""
+COARSE, FINE = np.array([-0.1, 0.0, 0.1]), np.arange(-3, 4) * 0.05
+"""Levels (m) of the floor that are tried about the best so far, one after the other."""
+ALIKE = 0.95
+"""Share of the greatest evidence from which a level counts as alike."""
 
 
 class Figure(NamedTuple):
@@ -97,24 +101,20 @@ def _without_ghosts(floor: Floor, masks: Sequence[Mask | None], explained: Seque
 def find_floor(cameras: Sequence[Camera], points: Array, sets: Sequence[Sequence[Mask | None]]) -> Floor:
     """The floor on which figures explain most of some frame sets' masks (H, W). `points`: surface points (P, 3), world, metres, of all
     people. Where few cameras see a person the hull reaches below the floor, so that the lowest points alone do not say where it is."""
-    tried = dict[float, float]()
-
     def evidence(level: float) -> float:
         floor = floor_under(cameras, points, level, TRIED_REACH, TRIED_NEAR)
         return sum(figure.evidence for masks in sets for figure in find_people(floor, masks))
 
-    def best(levels: Sequence[float]) -> float:
-        new = list[float]()
-        for level in levels:
-            if all(abs(level - other) > 0.02 for other in (*tried, *new)):
-                new.append(level)
-        with ThreadPoolExecutor(usable_cores(), "floor") as pool:
-            tried.update(zip(new, pool.map(evidence, new)))
-        return max(tried, key=lambda level: tried[level])
+    def best(levels: Array) -> float:
+        return float(levels[np.argmax(list(pool.map(evidence, levels)))])
 
-    about = best((0.0, *np.percentile(points[:, 2], (0.5, 2, 5, 10)).tolist()))
-    about = best([about - 0.1, about + 0.1])
-    return floor_under(cameras, points, best([about - 0.05, about + 0.05]))
+    with ThreadPoolExecutor(usable_cores(), "floor") as pool:
+        about = best(np.array([0.0, *np.percentile(points[:, 2], (0.5, 2, 5, 10))]))
+        about = best(about + COARSE)
+        levels = about + FINE
+        found = np.array(list(pool.map(evidence, levels)))
+    # evidence changes little within some centimetres, so that the greatest is chance: the middle of the levels with nearly as much
+    return floor_under(cameras, points, float(np.average(levels, weights=np.maximum(found - ALIKE * found.max(), 1e-9))))
 
 
 def telling(masks: Sequence[Mask | None]) -> list[Mask | None]:
@@ -172,7 +172,7 @@ def _middle(floor: Floor, best: Array, cell: int) -> Array:
 
 def _height(floor: Floor, place: Array, about: float, state: NDArray[np.uint8]) -> float:
     """Height of a figure of `about` that height: where its silhouettes end, in the views where no other figure is behind the head."""
-    z, tops = np.arange(0.6 * about, about + 0.35, 0.03), list[float]()
+    z, tops = np.arange(0.6 * about, max(HEIGHTS) + 0.35, 0.03), list[float]()
     across = np.array([-0.06, 0.0, 0.06])
     for n, camera in enumerate(floor.cameras):
         at = pixel_index(camera, figure_points(camera, place[None], floor.level + z.repeat(3), np.tile(across, len(z)))[0])

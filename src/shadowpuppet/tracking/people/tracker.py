@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -12,16 +13,16 @@ from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
+from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles
 from shadowpuppet.tracking.people.evidence import (
+    Division,
     Drawn,
     PersonObservation,
     draw_person,
     ignored_pixels,
-    nearest_to,
-    own_masks,
     picked,
     predicted,
 )
@@ -68,23 +69,26 @@ class Share(NamedTuple):
 def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Mask | None]) -> dict[int, Share]:
     """The people's states after a frame's surface points and masks (H, W), one per camera, of all of them together.
 
-    One person after another, each on the evidence that the others' bodies do not explain: bodies updated before in their new poses, the
-    rest in their predicted ones. A lost person's body explains nothing.
+    Each on the evidence that the others' bodies, in their predicted poses, do not explain; people who touch once more, with all bodies as
+    found. A lost person's body explains nothing. Cores share the people: none of them depends on another's result.
     """
     drawn = {n: draw_person(person.tracker, predicted(person.tracker.body, person.state)) for n, person in people.items()}
-    states, lost = dict[int, MultiviewState](), {n for n, person in people.items() if person.state.status == "lost"}
-    for n, person in people.items():
-        states[n] = _followed(person, drawn[n], _others(drawn, n, lost), points, masks)
-        drawn[n] = draw_person(person.tracker, states[n].pose)
-    for n in touching(drawn):
-        states[n] = _followed(people[n], drawn[n], _others(drawn, n, lost), points, masks)
-        drawn[n] = draw_person(people[n].tracker, states[n].pose)
-    shares = dict[int, Share]()
-    for n in people:
-        others = _others(drawn, n, lost)
-        own = picked(points, nearest_to(drawn[n], others, points))
-        shares[n] = Share(states[n], own, own_masks(drawn[n], others, masks), drawn[n])
-    return shares
+    evidence = Division(drawn, {n for n, person in people.items() if person.state.status == "lost"}, points, masks)
+
+    def follow(n: int, evidence: Division) -> tuple[MultiviewState, Drawn]:
+        tracker, rng, state = people[n]
+        own, ignored = evidence.of(n)
+        state = _judged(tracker.follow(rng, state, PersonObservation(tracker.views, own, masks, None, ignored)))
+        return state, draw_person(tracker, state.pose)
+
+    with ThreadPoolExecutor(max(min(len(people), usable_cores()), 1), "people") as pool:
+        found = dict(zip(people, pool.map(lambda n: follow(n, evidence), people)))
+        evidence = evidence.with_bodies({n: body for n, (_, body) in found.items()})
+        if close := touching(evidence.drawn):
+            found |= dict(zip(close, pool.map(lambda n: follow(n, evidence), close)))
+            evidence = evidence.with_bodies({n: found[n][1] for n in close})
+        own = dict(zip(people, pool.map(evidence.share, people)))
+    return {n: Share(state, *own[n], body) for n, (state, body) in found.items()}
 
 
 def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, drawn: Mapping[int, Drawn], points: SurfacePoints,
@@ -151,18 +155,6 @@ def explained(drawn: Mapping[int, Drawn], number: int) -> list[Mask]:
     if not drawn:
         return []
     return [np.logical_or.reduce([near(one.masks[n]) for one in drawn.values()]) for n in range(number)]
-
-
-def _others(drawn: Mapping[int, Drawn], n: int, lost: Container[int]) -> list[Drawn]:
-    return [other for m, other in drawn.items() if m != n and m not in lost]
-
-
-def _followed(person: Person, drawn: Drawn, others: Sequence[Drawn], points: SurfacePoints, masks: Sequence[Mask | None]) -> MultiviewState:
-    """A person's state after a frame, given how this person and the others are drawn."""
-    tracker, state = person.tracker, person.state
-    own = picked(points, nearest_to(drawn, others, points))
-    observation = PersonObservation(tracker.views, own, masks, None, ignored_pixels(drawn, others, masks))
-    return _judged(tracker.follow(person.rng, state, observation))
 
 
 def _judged(state: MultiviewState) -> MultiviewState:

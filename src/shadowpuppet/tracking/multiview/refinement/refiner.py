@@ -53,7 +53,7 @@ class Refiner:
         self.body, self.settings = body, settings or SurfaceSettings()
         self._chain = make_chain(body.skeleton)
         limbs = body.limbs
-        self._spheres, self._no_space = spheres_in(limbs), free_space(())
+        self.spheres, self._no_space = spheres_in(limbs), free_space(())
         self._limbs = limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts)
         self._parts = part_constants(limbs)
 
@@ -79,10 +79,10 @@ class Refiner:
         for each in passes:
             cloud, iterations, tau, space, emptiness = each if isinstance(each, Pass) else Pass(*each)
             space = space or self._no_space
-            distances = np.empty((len(space.windows), len(self._spheres.radii), 4))
+            distances = np.empty((len(space.windows), len(self.spheres.radii), 4))
             descend(poses, centre, np.asarray(pull, float), self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin,
                     max(cloud.total, 1e-9), self._numbers(tau), damping, iterations, self._which(cloud), self._room(),
-                    self._system(), self._spheres, space, distances, emptiness)
+                    self._system(), self.spheres, space, distances, emptiness)
         return poses
 
     def forces(self, poses: Array, cloud: Cloud, settings: ForceSettings) -> Array:
