@@ -205,8 +205,8 @@ def _section(width: float, x: float = 1.0, y: float = 1.0) -> Pair:
 
 SHOULDER_SLOPE, SHOULDER_START = 0.5, 0.3
 """Rise of the shoulders' tops toward the neck, per metre across; and where the shoulders begin, within the neck, as a share of the distance
-of the joint from the middle. Mid-shoulder, half a shoulder's length (some 72 mm) inside the acromion, is 32 mm above it (ANSUR, heights
-sitting; Gordon et al. 1989), that is 64 mm across."""
+of the joint from the middle. Mid-shoulder, half a shoulder's length (some 72 mm) inside the acromion, is some 30 mm above it (Gordon et al.
+1989: midshoulder and acromial heights, sitting)."""
 
 
 def _shoulders(s: AnatomicalSizes) -> list[_Limb]:
