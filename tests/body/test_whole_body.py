@@ -48,7 +48,7 @@ def mirrored(skeleton: Skeleton, poses: np.ndarray) -> np.ndarray:
 # Counts and sizes -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("name", "dofs", "parts", "soles"), [("anatomical", 32, 17, SOLES), ("cylinders", 25, 10, ())])
+@pytest.mark.parametrize(("name", "dofs", "parts", "soles"), [("anatomical", 32, 18, SOLES), ("cylinders", 25, 10, ())])
 def test_as_many_dof_parts_and_joints_as_said(name, dofs, parts, soles):
     body = BODY[name]
     assert (len(body.skeleton.dofs), len(body.parts), limbs_of(body).parts) == (dofs, parts, body.parts)
@@ -75,6 +75,20 @@ def test_the_shanks_middle_lies_outside_the_bone():
     for side, out in (("left", 1.0), ("right", -1.0)):
         n = limbs.parts.index(f"{side}_shank")
         assert (out * np.array([limbs.starts[n, 1], limbs.ends[n, 1]]) > 0.004).all()
+
+
+def test_the_shoulders_slope_from_the_neck_to_the_joints_and_move_with_the_chest():
+    body = BODY["anatomical"]
+    limbs = limbs_of(body)
+    left, right = (limbs.parts.index(f"{side}_shoulder") for side in ("left", "right"))
+    joints = body.points(np.zeros((1, 32)), names=["left_shoulder", "neck"])[0]
+    chest = body.skeleton.forward(np.zeros((1, 32)))[0][body.skeleton.joint_index("chest"), :, 3]
+    assert {int(limbs.joints[n]) for n in (left, right)} == {body.skeleton.joint_index("chest")}
+    np.testing.assert_allclose(limbs.ends[left] + chest, joints[0])
+    np.testing.assert_allclose([limbs.ends[left], limbs.starts[left]], np.array([limbs.starts[right], limbs.ends[right]]) * [1, -1, 1])
+    way = limbs.starts[left] - limbs.ends[left]
+    np.testing.assert_allclose(way[2] / -way[1], 0.5)
+    assert limbs.starts[left, 2] + chest[2] < joints[1, 2]  # its axis begins below the base of the neck
 
 
 def measures(body: Body) -> np.ndarray:

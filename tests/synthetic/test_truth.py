@@ -11,7 +11,9 @@ from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.metrics import joint_errors
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec, Viewpoint
+from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.kinematics import SEGMENTS
+from shadowpuppet.synthetic.person.limbs import leg
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import feet_of, perform
 from shadowpuppet.synthetic.truth import SOLES, Soles, sole_points, write_truth
@@ -63,6 +65,17 @@ def test_standing_soles_are_flat_and_the_toes_ahead_of_the_heels():
     _, figure = perform(spec, np.random.default_rng(2))
     ankle = figure.joints[0, JOINTS.index("left_ankle")]
     assert feet.points[0, TOE, 1] < ankle[1] < feet.points[0, HEEL, 1]
+
+
+@pytest.mark.parametrize("body", [Mannequin(), Mannequin(stature=1.2, build=0.5)])
+def test_the_shoe_is_flat_from_heel_to_ball_and_its_rear_a_heel_s_way_behind_the_ankle(body):
+    shoe = next(loft for loft in leg(body, Clothes()) if loft.segment == "left_foot")
+    along, _, depth, _, down = shoe.stations.T
+    under = body.length("ankle") + shoe.start[2] - depth - down  # height of the sole's middle over the floor
+    np.testing.assert_allclose(under, 0.002, atol=0.003)
+    rear = shoe.start[1] + shoe.caps[0]
+    assert 0.2 < rear / body.measure("foot_length") < 0.26
+    assert along[-1] - shoe.start[1] >= -body.ball()[1]  # it reaches the ball
 
 
 @pytest.mark.parametrize(("posture", "heels", "toes"), [("seated", 1, 1), ("kneeling", 0, 0), ("lying", 1, 0)])

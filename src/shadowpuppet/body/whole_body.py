@@ -203,18 +203,32 @@ def _section(width: float, x: float = 1.0, y: float = 1.0) -> Pair:
     return x * width / 2, y * width / 2
 
 
+SHOULDER_SLOPE, SHOULDER_START = 0.5, 0.3
+"""Rise of the shoulders' tops toward the neck, per metre across; and where the shoulders begin, within the neck, as a share of the distance
+of the joint from the middle. Mid-shoulder, half a shoulder's length (some 72 mm) inside the acromion, is some 30 mm above it (Gordon et al.
+1989: midshoulder and acromial heights, sitting)."""
+
+
+def _shoulders(s: AnatomicalSizes) -> list[_Limb]:
+    """Both sides from within the neck down to the shoulder joints, moving with the chest."""
+    outer, low, yoke = 0.5 * s.shoulder_distance, s.shoulder_drop - s.thorax_height, _section(s.shoulder_thickness)
+    inner, forward, cap = SHOULDER_START * outer, s.shoulder_forward, 0.3 * s.shoulder_thickness
+    high = low - SHOULDER_SLOPE * (outer - inner)  # along y, which points down
+    left, right = ((inner, outer), (high, low)), ((-outer, -inner), (low, high))
+    return [_Limb(f"{side}_shoulder", "chest", "left", reach, (yoke, yoke), (forward, forward), (cap, cap), down)
+            for side, (reach, down) in zip(SIDES, (left, right))]
+
+
 def _trunk(s: AnatomicalSizes) -> list[_Limb]:
     """Two parts that meet at the waist, shoulders, neck and head; the neck leans forward."""
     hips, waist, chest = ((depth / 2, width / 2) for depth, width in (
         (s.pelvis_depth, s.pelvis_width), (s.waist_depth, s.waist_width), (s.chest_depth, s.chest_width)))  # fmt: skip
     neck, jaw, skull = _section(s.neck_width), (0.36 * s.head_depth, 0.40 * s.head_width), (0.5 * s.head_depth, 0.5 * s.head_width)
-    high, yoke = s.thorax_height - s.shoulder_drop, _section(s.shoulder_thickness)
-    armpit = 0.65 * high
+    armpit = 0.65 * (s.thorax_height - s.shoulder_drop)
     return [
         _Limb("pelvis", "pelvis", "up", (-s.hip_drop, s.lumbar_height), (hips, waist), caps=(0.4 * s.pelvis_depth, 0.2 * s.waist_depth)),
         _Limb("chest", "chest", "up", (0.0, armpit), (waist, chest), caps=(0.2 * s.waist_depth, s.thorax_height - armpit)),
-        _Limb("shoulders", "chest", "left", (-0.5 * s.shoulder_distance, 0.5 * s.shoulder_distance), (yoke, yoke),
-              (s.shoulder_forward, s.shoulder_forward), (0.3 * s.shoulder_thickness, 0.3 * s.shoulder_thickness), (-high, -high)),
+        *_shoulders(s),
         _Limb("neck", "head", "up", (-0.1 * s.neck_length, s.neck_length), (neck, neck), (0.0, s.head_forward),
               (0.2 * s.neck_width, 0.2 * s.neck_width)),
         _Limb("head", "head", "up", (s.neck_length - 0.15 * s.head_height, s.neck_length + 0.45 * s.head_height), (jaw, skull),
@@ -262,7 +276,7 @@ def _leg(side: str, s: AnatomicalSizes) -> list[_Limb]:
 
 
 def anatomical(sizes: AnatomicalSizes) -> Body:
-    """32 DOF, 17 tapered elliptic limbs. Tapers of arms and legs and their offsets from the bone are fractions of the widths, measured
+    """32 DOF, 18 tapered elliptic limbs. Tapers of arms and legs and their offsets from the bone are fractions of the widths, measured
     on a mesh of a person; the rest of the shape is our own."""
     sides = [limb for limbs in (_arm, _leg) for side in SIDES for limb in limbs(side, sizes)]
     return _body("anatomical", anatomical_skeleton(sizes), [*_trunk(sizes), *sides],

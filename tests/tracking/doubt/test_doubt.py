@@ -32,6 +32,11 @@ def test_every_joint_and_part_of_every_body_has_a_limb_a_group_and_a_lever(name)
     assert all(0.1 < lever_of(joint) < 1 for joint in body.landmark_names)
 
 
+def test_shoulders_move_with_the_trunk():
+    trunk = {"pelvis", "chest", "left_shoulder", "right_shoulder", "neck", "head"}
+    assert {part for part in average_body("anatomical").parts if limb_of_part(part) == "trunk"} == trunk
+
+
 def test_soles_have_factors_of_their_own_with_several_cameras_and_hands_factors_with_one():
     """Smoothed ankles are nearer to the truth than heels and toes, which made the ankles' intervals too wide."""
     several, one = (variance_model(kind).factors for kind in ("multiview", "monocular"))

@@ -52,11 +52,12 @@ def trunk(body: Mannequin, clothes: Clothes) -> list[Loft]:
 
 
 def shoulders(body: Mannequin, clothes: Clothes) -> list[Loft]:
-    """Lofts from neck to shoulder, moving with the clavicle, and of a woman's breasts."""
+    """Lofts from neck to shoulder, moving with the clavicle, and of a woman's breasts. The shoulders slope: in the middle between neck and
+    acromion their tops are some 30 mm above the acromion's (Gordon et al. 1989: midshoulder and acromial heights, sitting)."""
     H, joints, neck = body.stature, body.rest(), body.measure("neck") / (2 * np.pi)
     breast, unit = body.measure("chest_depth") / 2 + 0.5 * clothes.looseness, H / 1.75
     shirt = {"materials": ("shirt", "shirt")}
-    inner = np.array([0.6 * neck, joints["neck"][1] + 0.006, 0.826 * H])
+    inner = np.array([0.6 * neck, joints["neck"][1] + 0.006, 0.845 * H])
     outer = joints["left_shoulder"] + np.array([-0.006, 0.002, 0.012]) * unit
     rows: Rows = [
         (0, 0.040 * unit, 0.034 * unit),

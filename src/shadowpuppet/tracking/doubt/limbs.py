@@ -41,9 +41,9 @@ def levers_of(joints: tuple[str, ...]) -> Array:
 
 
 def limb_of_part(part: str) -> str:
-    """The limb that a part of a body's shape, such as `left_forearm`, belongs to."""
+    """The limb that a part of a body's shape, such as `left_forearm`, belongs to; a shoulder moves with the trunk."""
     side, _, name = part.partition("_")
-    if side not in SIDES or not name:
+    if side not in SIDES or name in ("", "shoulder"):
         return "trunk"
     return f"{side}_leg" if name in LEG_PARTS else f"{side}_arm"
 

@@ -20,7 +20,7 @@ from shadowpuppet.tracking.multiview.refinement.free_space import spheres_in
 from shadowpuppet.tracking.people.floor import figure_points
 
 PARTS = ("trunk", "arms", "legs")
-NAMES = ({"chest", "shoulders", "torso"}, {"upper_arm", "forearm", "lower_arm"}, {"thigh", "shank", "upper_leg", "lower_leg"})
+NAMES = ({"chest", "shoulder", "torso"}, {"upper_arm", "forearm", "lower_arm"}, {"thigh", "shank", "upper_leg", "lower_leg"})
 """Limbs of each part, without their side. Pelvis, hands and feet are left out: they may be on either side of a hem."""
 BINS = 48
 LOWEST, HIGHEST = np.array([-1.2, -1.2, 2.5]), np.array([1.2, 1.2, 5.7])
