@@ -196,3 +196,5 @@ def test_how_a_live_session_went(printed):
     more = printed(pairs(_live_rows(live | {"breaks": 2, "smoothed_latency_ms": {"median": 150.2}})))
     assert more[1] == "smoothed 150 ms from capture, for the display and other programs"
     assert more[3] == "breaks 2 times no pictures came"
+    slow = printed(pairs(_live_rows(live | {"frames_per_s": 5.0})))
+    assert "too slow only one picture in 5 is tracked: use fewer cameras" in " ".join(slow)

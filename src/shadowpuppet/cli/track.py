@@ -47,6 +47,9 @@ else:
 
 BARS = "▁▂▃▄▅▆▇█"
 
+KEEPS_UP = 0.6
+"""Least share of the pictures that a live session tracks without a hint."""
+
 
 def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Folder of the run. [default: run-<recording>]")] = None,
           resume: Annotated[bool, switch("Go on with a run that was broken off, to the same result.")] = False,
@@ -265,10 +268,13 @@ def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
 def _live_rows(live: Mapping[str, Any]) -> list[tuple[str, str | None]]:
     """Rows on the latency, speed and interruptions of a live session."""
     late, frames, smoothed = live["latency_ms"], live["latency_frames"], live.get("smoothed_latency_ms")
+    share = live["frames_per_s"] * live["interval_ms"] / 1000
     return [("latency", f"{late['median']:.0f} ms from capture to pose ({frames['median']:.2f} of a frame's time); p95 "
                         f"{late['p95']:.0f} ms ({frames['p95']:.2f})"),
             ("smoothed", f"{smoothed['median']:.0f} ms from capture, for the display and other programs" if smoothed else None),
             ("speed", f"{live['frames_per_s']:.1f} frames/s of {1000 / live['interval_ms']:.1f}; {live['dropped']} dropped"),
+            ("too slow", f"only one picture in {1 / share:.0f} is tracked: use fewer cameras, or a lower --rate; play a film slower, "
+                         "with --speed below 1" if 0 < share < KEEPS_UP else None),
             ("breaks", f"{live['breaks']} times no pictures came" if live["breaks"] else None)]
 
 
