@@ -12,7 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from naive_surface import LIGHTS, naive_distance
 
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError
+from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.synthetic import (
@@ -184,6 +186,20 @@ def gap(postures):
     points = np.stack([at(figure, f"{side}_{name}") for side in ("left", "right") for name in ("wrist", "hand")])
     share = np.clip(((points - low) * along).sum(-1) / (along**2).sum(-1), 0, 1)[..., None]
     return np.linalg.norm(points - low - share * along, axis=-1).min(0)
+
+
+@pytest.mark.parametrize("body", [Mannequin(), Mannequin(stature=1.629, build=0.0)])
+def test_shoulders_slope_as_people_s_do(body):
+    """Mid-shoulder is some 30 mm above the acromion (midshoulder and acromial heights of Gordon et al. 1989)."""
+    size, distance, height = (640, 480), 60.0, 0.82 * body.stature
+    T = rigid([[1, 0, 0], [0, 0, -1], [0, 1, 0]], np.array([0, height, distance]))
+    camera = Camera("front", size, np.array([[1000 * distance, 0, 320], [0, 1000 * distance, 240], [0, 0, 1.0]]), T_camera_world=T)
+    clothes = Clothes(hair=0.004)
+    standing = pose(body, np.zeros((1, len(CHANNELS))))
+    mask = PersonRenderer(camera, dressed(body, clothes), clothes, LIGHTS).mask(standing, 0)
+    acromion = body.measure("biacromial_breadth") / 2
+    low, high = (np.flatnonzero(mask[:, int(320 + 1000 * x)])[0] for x in (acromion, acromion - 0.072 * body.stature / 1.75))
+    assert low - high == pytest.approx(32, abs=4)  # a pixel is a millimetre
 
 
 def test_arms_are_kept_out_of_the_trunk():
