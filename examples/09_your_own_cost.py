@@ -34,7 +34,7 @@ pixels = footage.camera.project(hand) + NOISE * rng.standard_normal((len(hand), 
 fit = sp.find_person(rng, footage.camera, masks[:10:3], height=footage.recording.subject.height)
 tracker = sp.MonocularTracker(fit.guess.picture(footage.camera), options.tracker)
 
-errors = {}
+errors, apart = {}, {}  # of the left hand: mm, and pixels
 for name, costs in (("silhouettes", [None] * len(masks)), ("with the glove", [glove(tracker.picture, pixel) for pixel in pixels])):
     rng = np.random.default_rng(0)
     states = [tracker.start(rng, masks[0], costs[0])]
@@ -42,5 +42,5 @@ for name, costs in (("silhouettes", [None] * len(masks)), ("with the glove", [gl
         states.append(tracker.step(rng, states[-1], mask, cost))
     found = tracker.picture.points_world([state.pose for state in states], ["left_hand"])[:, 0]
     errors[name] = 1000 * np.linalg.norm(found - hand, axis=1).mean()
-    drawn = np.linalg.norm(footage.camera.project(found) - footage.camera.project(hand), axis=1).mean()
-    print(f"{name:14}  error of the left hand {errors[name]:4.0f} mm, in the image {drawn:4.1f} pixels")
+    apart[name] = np.linalg.norm(footage.camera.project(found) - footage.camera.project(hand), axis=1).mean()
+    print(f"{name:14}  error of the left hand {errors[name]:4.0f} mm, in the image {apart[name]:4.1f} pixels")

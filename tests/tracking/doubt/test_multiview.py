@@ -41,14 +41,14 @@ def some(which) -> SurfacePoints:
     return SurfacePoints(*(values[keep] for values in whole))
 
 
-def test_a_body_that_explains_its_surface_is_vouched_for():
-    found, _ = doubt()
+def test_a_body_that_explains_its_surface_and_silhouettes_is_vouched_for():
+    found, _ = doubt(views=actor.masks(BODY, POSE))
     assert found.joint_sd.shape == (len(NAMES), 3)
     assert found.pose_sd.shape == POSE.shape
     assert (found.joint_sd > 0).all()
     assert np.isfinite(found.pose_sd).all()
     assert set(found.limb_status) == {"tracked"}
-    again, _ = doubt()
+    again, _ = doubt(views=actor.masks(BODY, POSE))
     assert all(np.array_equal(a, b) for a, b in zip(found[:3], again[:3]))
     assert not found.modes
 
@@ -62,7 +62,7 @@ def test_an_arm_without_surface_is_more_doubtful_than_one_with_it():
 def test_particles_that_disagree_make_the_joints_doubtful():
     (one, _), (other, _) = doubt(), doubt(spread=0.1)
     assert (other.joint_sd >= one.joint_sd).all()
-    assert other.joint_sd[HAND].max() > 1.3 * one.joint_sd[HAND].max()
+    assert other.joint_sd[HAND].max() > 1.1 * one.joint_sd[HAND].max()
 
 
 def test_a_joint_that_was_near_its_counterpart_may_be_confused_with_it():

@@ -132,9 +132,10 @@ def test_every_setting_runs(overrides):
 def test_the_local_search_is_the_hybrid_filters_and_ends_at_less_cost():
     _, seen = actor.filmed()
     for method, less in (("hybrid", True), ("particle_filter", False)):
-        without, with_it = (np.array([s.cost for s in track(tracker(method=method, local=n), seen[:6])]) for n in (0, 12))
+        without, with_it = (np.array([[s.cost for s in track(tracker(method=method, local=n), seen[:6], seed)] for seed in range(3)])
+                            for n in (0, 12))
         if less:
-            assert with_it[1:].mean() < without[1:].mean()
+            assert with_it[:, 1:].mean() < without[:, 1:].mean()
         else:
             np.testing.assert_array_equal(with_it, without)
 
@@ -147,7 +148,7 @@ def test_rare_arms_cost_what_they_are_rare():
         costs.append(of.weigh(of.observe(track(of, seen[:1])[0], *seen[1]))(poses)[0])
     rarity = of.rarity_of_arms(poses)
     assert rarity.shape == (len(poses),)
-    assert np.ptp(rarity) > 0.1
+    assert np.ptp(rarity) > 0.05
     np.testing.assert_allclose(costs[1] - costs[0], 1e-4 * rarity, atol=1e-12)
     np.testing.assert_allclose(costs[2] - costs[0], 3e-4 * rarity, atol=1e-12)
 
