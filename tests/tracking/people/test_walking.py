@@ -35,6 +35,17 @@ def test_after_a_turn_the_way_begins_again():
     assert walk.forward == 0
 
 
+@pytest.mark.parametrize(("pause", "noticed"), [(0.2, True), (0.9, False)])
+def test_a_body_that_is_found_turned_round_after_a_loss_is_noticed(pause, noticed):
+    """Found again it was searched for, and front and back hardly differ; in longer than that people turn."""
+    walk = walked(1.0, 0.0)
+    last = walk.steps[-1]
+    walk.lose()
+    assert walk.forward == 0
+    walk.add(Step(last.time + pause, last.place, -last.facing))
+    assert walk.jerked == (last.time if noticed else None)
+
+
 def test_a_long_way_ago_does_not_count():
     walk = walked(1.2, np.pi)
     for n in range(30):

@@ -167,7 +167,7 @@ class Group:
         """Turn a person round whose body moves backwards: beside others the silhouettes hardly distinguish front and back, but people
         walk forwards."""
         if member.state is None or member.share is None or member.lost_since is not None:
-            member.walk.forget()
+            member.walk.lose()
             member.trial = None
             return
         member.walk.add(step_of(member.subject.body, member.state.pose, time))

@@ -53,8 +53,13 @@ class Walk:
             self.steps.popleft()
 
     def forget(self) -> None:
-        """Begin again, as after the body was turned round or lost."""
+        """Begin again, as after the body was turned round."""
         self.steps.clear()
+
+    def lose(self) -> None:
+        """Begin again after the last step, as where the body is lost: found again, it may be turned round."""
+        while len(self.steps) > 1:
+            self.steps.popleft()
 
     @property
     def jerked(self) -> float | None:
