@@ -54,7 +54,7 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     steps("silhouettes of the first seconds in all films")
     first = first_seconds(rig, silhouettes, [film.sample for film in films], opening, options.masks)
     steps("do the cameras agree")
-    agree = agreement_of_people(rig, census, first) if census is not None and several else agreement_of_one(rig, first)
+    agree = _agreement_of_people(rig, census, first) if census is not None and several else _agreement_of_one(rig, first)
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agree)
     refusal = _rig_refusal(look, first)
@@ -67,24 +67,27 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     return Survey(rig, silhouettes, silhouettes, first, look, census)
 
 
-def agreement_of_one(rig: Rig, first: FirstSeconds) -> Agreement:
+def _agreement_of_one(rig: Rig, first: FirstSeconds) -> Agreement:
     """Do the cameras agree about the person of the first seconds?"""
     step = float(np.median(np.diff(first.times))) if len(first.times) > 1 else np.nan
     return agreement(rig.cameras, first.masks, step)
 
 
-def agreement_of_people(rig: Rig, census: Census, first: FirstSeconds) -> Agreement:
-    """Do the cameras agree about each of several people, in the views that show them apart? Of all together one camera may see more than
-    another; all together tell of a camera that shows nobody where the others do."""
+def _agreement_of_people(rig: Rig, census: Census, first: FirstSeconds) -> Agreement:
+    """Do the cameras agree about each of several people, in the views that show them apart? All silhouettes together say too much, as one
+    camera sees more people than another; they are used for a camera that shows nobody apart."""
     rows = list[View]()
     for n in evenly_spread(len(first.masks), SETS_COMPARED):
         masks = first.masks[n]
         figures = census.people(masks)
         each = (views_of(census.floor, one, [other for other in figures if other is not one], masks) for one in figures)
         rows += [row for row in each if sum(mask is not None for mask in row) > 1]
-    found, together = agreement(rig.cameras, rows), agreement_of_one(rig, first)
     if 2 * len(rows) < SETS_COMPARED:  # one person in a calibration of the wrong unit may be taken for several
-        return together
+        return _agreement_of_one(rig, first)
+    found = agreement(rig.cameras, rows)
+    if None not in found.apart:
+        return found
+    together = _agreement_of_one(rig, first)
     return replace(found, apart=tuple(whole if one is None else one for one, whole in zip(found.apart, together.apart, strict=True)))
 
 
