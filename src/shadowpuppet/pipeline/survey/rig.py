@@ -74,8 +74,8 @@ def _agreement_of_one(rig: Rig, first: FirstSeconds) -> Agreement:
 
 
 def _agreement_of_people(rig: Rig, census: Census, first: FirstSeconds) -> Agreement:
-    """Do the cameras agree about each of several people, in the views that show them apart? All silhouettes together say too much, as one
-    camera sees more people than another; they are used for a camera that shows nobody apart."""
+    """Do the cameras agree about each of several people, in the views that show them apart? One camera may see more
+    people than another, so that whole silhouettes are compared only for a camera without such a view."""
     rows = list[View]()
     for n in evenly_spread(len(first.masks), SETS_COMPARED):
         masks = first.masks[n]

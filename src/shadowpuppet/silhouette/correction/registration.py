@@ -115,21 +115,14 @@ class Registration:
         if self._levels is None:
             return True
         points = self._levels[0]
-        difference, values = compared(points, self._reduced(image), NONE if movement is None else movement), points.value
+        picture = self._reduced(image)
+        difference, values = compared(points, picture, NONE if movement is None else movement), points.value
         if people is not None:
-            shown = ~self._about(people)[points.places[1], points.places[0]]
+            shown = ~_about(people, picture.shape)[points.places[1], points.places[0]]
             if np.count_nonzero(shown) < LEAST_SHOWN * len(values):
                 return False
             difference, values = difference[shown], values[shown]
         return median_of(np.abs(difference)) / median_of(np.abs(values)) < UNLIKE
-
-    def _about(self, people: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Pixels of the reduced picture whose values a mask (H, W) of people changes."""
-        import cv2
-
-        assert self._levels is not None
-        small = cv2.resize(people.view(np.uint8), self._reduced_grey(self.scene).shape[::-1], interpolation=cv2.INTER_AREA)
-        return np.asarray(cv2.dilate(small, np.ones((2 * round(COARSE) + 1,) * 2, np.uint8)), np.uint8) > 0
 
     def pixels(self, movement: Homography) -> float:
         """The greatest displacement of a corner by a movement, pixels of the frame."""
@@ -208,6 +201,14 @@ def _halved(picture: np.ndarray) -> np.ndarray:
 def _unlike(points: Points, difference: Floats) -> float:
     """Median of the differences (N,) of points over that of their values: near 0 for pictures that match, 1.4 for strangers."""
     return median_of(np.abs(difference)) / points.typical
+
+
+def _about(people: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Pixels of a reduced picture of a shape (h, w) whose values a mask (H, W) of people changes."""
+    import cv2
+
+    small = cv2.resize(people.view(np.uint8), shape[::-1], interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.dilate(small, np.ones((2 * round(COARSE) + 1,) * 2, np.uint8)), np.uint8) > 0
 
 
 def _mapped(movement: Homography, xy: NDArray[np.float64]) -> NDArray[np.float64]:
