@@ -183,7 +183,7 @@ def test_a_camera_that_freezes_is_set_aside_and_named(recording, tmp_path, monke
             yield seen._replace(masks=(seen.masks[0], held, *seen.masks[2:]))
 
     monkeypatch.setattr("shadowpuppet.pipeline.track.read_frames", frozen)
-    with pytest.warns(ShadowPuppetWarning, match="set aside for a time \\(camera 'cam2', frozen from"):
+    with pytest.warns(ShadowPuppetWarning, match="left out for a time \\(camera 'cam2', frozen from"):
         done = track(recording, tmp_path / "run")
     (found,) = done.metrics["set_aside"]
     assert (found["camera"], found["why"]) == ("cam2", "frozen")

@@ -102,3 +102,12 @@ def test_a_film_converted_to_a_higher_rate_is_not_frozen():
     assert not is_frozen(4, 4 / 120)
     assert not is_frozen(2, 2.0)
     assert is_frozen(4, 4 / 15)
+
+
+def test_one_camera_is_never_set_aside_but_noted_as_blind():
+    watch, full = RigWatch(1), np.ones((60, 80), bool)
+    kept = [watch(n / RATE, [picture]) for n, picture in enumerate([person(3), full, full, *[person(3)] * 30])]
+    assert all(masks[0] is not None for masks in kept)
+    (interval,) = watch.intervals
+    assert (interval.camera, interval.why, interval.frames) == (0, "blind", 2)
+    assert (interval.begin, interval.end) == (1 / RATE, 2 / RATE)

@@ -233,10 +233,10 @@ def set_aside(intervals: Iterable[Interval], names: Sequence[str]) -> dict[str, 
 
 
 def warn_of_set_aside(found: Sequence[Mapping[str, Any]]) -> None:
-    """Warn of cameras that were set aside; `found`: the entry of metrics.json."""
+    """Warn of cameras that were set aside, or of the only one that was blind; `found`: the entry of metrics.json."""
     if found:
         when = "; ".join(f"camera {one['camera']!r}, {one['why']} from {one['from_s']:.1f} to {one['to_s']:.1f} s" for one in found)
-        warn(f"cameras were set aside for a time ({when}): frozen is a picture that does not change while the person moves in others, "
+        warn(f"cameras were left out for a time ({when}): frozen is a picture that does not change while the person moves in others, "
              "blind one of which nearly all is silhouette, as when it turns black; late or early one that shows what the others showed, or "
              "will show, at another time: are its frames complete, and is its start in recording.toml right?")
 

@@ -208,8 +208,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
             frames = stack.enter_context(closing(read_frames(survey.rig, segment, ready=options.masks, every=options.every)))
             if cache is not None:
                 frames = stack.enter_context(closing(cache.frames(frames, options)))
-            if survey.rig.is_multiview:
-                frames = (seen._replace(masks=watch(seen.time, seen.masks, seen.own)) for seen in frames)
+            frames = (seen._replace(masks=watch(seen.time, seen.masks, seen.own)) for seen in frames)
             for found, seen in zip(earlier, frames):
                 watch.tracked(subject.drawn(found))
                 leans.append(subject.lean(found, seen.masks))

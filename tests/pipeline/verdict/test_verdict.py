@@ -13,7 +13,7 @@ from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
 from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
 from shadowpuppet.pipeline.look import Look
-from shadowpuppet.pipeline.verdict.of_run import expected_error, lost_share, verdict_of_run
+from shadowpuppet.pipeline.verdict.of_run import blind_frames, expected_error, lost_share, verdict_of_run
 from shadowpuppet.pipeline.verdict.verdict import verdict_of, verdict_of_look
 from shadowpuppet.silhouette.correction.condition import FilmCondition
 from shadowpuppet.silhouette.quality import MaskQuality
@@ -122,6 +122,18 @@ def test_a_camera_that_was_set_aside_is_a_reason_once_and_by_name(frames, word):
     run = motion(0.03, statuses="t" * 30)
     aside = [{"camera": "b", "why": "late", "frames": many, "from_s": 2.25 + n, "to_s": 2.25 + n} for n, many in enumerate(frames)]
     assert verdict_of_run(LOOK, run, aside) == (word, ("camera 'b' late from 2.2 s: check its start",))
+
+
+def test_frames_in_which_every_camera_was_blind_are_no_error_of_the_joints():
+    """A second without a picture makes a good run doubtful, not bad; a person lost in pictures that show them counts in full."""
+    run = motion(0.06, statuses="tttttttttl")
+    black = [{"camera": "cam", "why": "blind", "frames": 1, "from_s": 9.0, "to_s": 9.0}]
+    assert (expected_error(run), expected_error(run, blind_frames(run, black, 1))) == pytest.approx((0.136, 0.096), abs=1e-3)
+    assert verdict_of_run(LOOK, run).word == "bad"
+    assert verdict_of_run(LOOK, run, black) == ("doubtful", ("person lost in 10 % of frames: run with --overlay to see",
+                                                             "camera 'cam' blind from 9.0 s: look at its film"))
+    assert not blind_frames(run, black, 2).any()
+    assert not blind_frames(run, [black[0] | {"why": "frozen"}], 1).any()
 
 
 def test_what_the_look_found_is_among_the_reasons():

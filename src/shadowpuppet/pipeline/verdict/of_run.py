@@ -7,6 +7,7 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
 from shadowpuppet.motion.limbs import DOUBTFUL
@@ -24,6 +25,8 @@ REMEDIES = {"late": "check its start", "early": "check its start", "frozen": "ch
 """What to do about a camera, by why it was set aside."""
 WIDE, FAR = {1: 0.105, 2: 0.05}, {1: 0.12, 2: 0.07}
 """Expected joint errors (m) above which a run is doubtful, and bad; for one camera, and for two or more."""
+ROUNDED = 1e-3
+"""Rounding (s) of the times in `set_aside`."""
 MEAN_DISTANCE = 2 * np.sqrt(2 / np.pi) / np.sqrt(3)
 """Mean length of a vector of three independent normal errors, over the root of the sum of their variances."""
 
@@ -32,7 +35,7 @@ def verdict_of_run(look: Look | RigLook, motion: Motion, aside: Sequence[Mapping
     """The verdict on a run of a recording, from what the look found and what the run states of itself; `aside`: the entry `set_aside` of
     metrics.json."""
     cameras = len(look.cameras) if isinstance(look, RigLook) else 1
-    return verdict_of(chain(_cautions(motion, cameras), _without_cameras(aside, len(motion)), look.doubts))
+    return verdict_of(chain(_cautions(motion, cameras, blind_frames(motion, aside, cameras)), _without_cameras(aside, len(motion)), look.doubts))
 
 
 def lost_share(motion: Motion) -> float:
@@ -41,10 +44,20 @@ def lost_share(motion: Motion) -> float:
     return float(np.count_nonzero(motion.status == "lost") / present) if present else 0.0
 
 
-def expected_error(motion: Motion) -> float:
+def blind_frames(motion: Motion, aside: Sequence[Mapping[str, Any]], cameras: int) -> NDArray[np.bool_]:
+    """Frames (T,) in which all cameras were blind, from the entry `set_aside` of metrics.json: no picture could have shown the person."""
+    blind = np.zeros((cameras, len(motion)), bool)
+    names = list(dict.fromkeys(one["camera"] for one in aside))
+    for one in aside:
+        if one["why"] == "blind":
+            blind[names.index(one["camera"])] |= (motion.times > one["from_s"] - ROUNDED) & (motion.times < one["to_s"] + ROUNDED)
+    return blind.all(0)
+
+
+def expected_error(motion: Motion, blind: NDArray[np.bool_] | None = None) -> float:
     """Mean joint error, metres, that the stated standard deviations lead one to expect, a lost joint counted as 0.5 m; not a number where
-    none is stated."""
-    present = motion.status != "absent"
+    none is stated. `blind`: frames (T,) that are left out."""
+    present = (motion.status != "absent") if blind is None else (motion.status != "absent") & ~blind
     lengths = MEAN_DISTANCE * np.sqrt((motion.joint_sd[present] ** 2).sum(2))
     if not np.isfinite(lengths).any():
         return np.nan
@@ -59,7 +72,7 @@ def _without_cameras(aside: Sequence[Mapping[str, Any]], frames: int) -> Iterato
         yield Caution(short, short, HARMFUL if sum(one["frames"] for one in times) > OFTEN_LOST * frames else NOTED)
 
 
-def _cautions(motion: Motion, cameras: int) -> Iterator[Caution]:
+def _cautions(motion: Motion, cameras: int, blind: NDArray[np.bool_]) -> Iterator[Caution]:
     if not (motion.status != "absent").any():
         yield Caution("nobody was seen in any frame", "nobody was seen: film the empty scene and the person", RUINOUS)
         return
@@ -67,7 +80,7 @@ def _cautions(motion: Motion, cameras: int) -> Iterator[Caution]:
     if lost > OFTEN_LOST:
         short = f"person lost in {100 * lost:.0f} % of frames: run with --overlay to see"
         yield Caution(short, short, RUINOUS if lost > MOSTLY_LOST else HARMFUL)
-    error = expected_error(motion)
+    error = expected_error(motion, blind)
     if error > WIDE[kind]:
         short = f"joints may be off by {1000 * error:.0f} mm on average"
         yield Caution(short, short, RUINOUS if error > FAR[kind] else HARMFUL)

@@ -1,4 +1,4 @@
-"""Which of several cameras are set aside while a recording or a live session is tracked."""
+"""Which cameras are set aside, or blind, while a recording or a live session is tracked."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from shadowpuppet.tracking.multiview.out_of_step import StepWatch
 
 class RigWatch:
     """Sets cameras aside that are frozen, blind or out of step, and takes them back: `watch(seconds, masks)` has None in place of their
-    masks. `tracked` follows for each frame set, in the same order."""
+    masks. `tracked` follows for each frame set, in the same order. Of one camera it notes when it is blind."""
 
     def __init__(self, number: int) -> None:
         """For a number of cameras."""
@@ -20,10 +20,14 @@ class RigWatch:
         self._many = number > 1
 
     def __call__(self, seconds: float, masks: Sequence[Mask | None], own: Sequence[Mask | None] = ()) -> tuple[Mask | None, ...]:
-        """The masks (H, W) of a frame set at a time (s), None for a camera without a picture or one that is set aside.
+        """The masks (H, W) of a frame set at a time (s), None for a camera without a picture or one that is set aside. A single camera is
+        never set aside: when it is blind is only noted.
 
         own: masks as each camera's own picture has them, where other cameras have added to `masks`. A frozen picture's stay alike.
         """
+        if not self._many:
+            self._watch(seconds, masks)
+            return tuple(masks)
         kept = self._steps(seconds, self._watch(seconds, own or masks))
         return tuple(None if of_own is None else mask for of_own, mask in zip(kept, masks, strict=True))
 
@@ -34,7 +38,7 @@ class RigWatch:
 
     @property
     def intervals(self) -> list[Interval]:
-        """When cameras were set aside."""
+        """When cameras were set aside, or the only one was blind."""
         return self._watch.aside.intervals + self._steps.aside.intervals
 
     @property
