@@ -11,6 +11,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 import tomllib
 from pathlib import Path
@@ -169,6 +170,24 @@ def test_progress_is_printed_where_there_is_no_terminal(capsys, monkeypatch):
         listener.begin("tracking")
         time.sleep(0.1)
     assert capsys.readouterr().err == ""
+
+
+def test_a_line_of_progress_does_not_fall_into_what_is_printed_next():
+    """On a machine with much to do the thread may be about to print when progress ends."""
+    printing, printed = threading.Event(), []
+
+    def line():
+        printing.set()
+        time.sleep(0.1)
+        return "looking"
+
+    lines = terminal_module.LogLines(SimpleNamespace(print=lambda text, **_: printed.append(text)), line, lambda: 0.001)
+    lines.start()
+    printing.wait()
+    lines.stop()
+    assert printed == ["... looking"]
+    time.sleep(0.2)
+    assert printed == ["... looking"]
 
 
 def test_compiling_is_said_while_it_lasts(capsys, monkeypatch):

@@ -37,18 +37,21 @@ class LogLines:
         """Nothing is printed before `start`."""
         self.console, self._line, self._pause = console, line, pause
         self._end: threading.Event | None = None
+        self._printer: threading.Thread | None = None
 
     def start(self) -> None:
         """Start printing, unless that was done."""
         if self._end is None:
             self._end = threading.Event()
-            threading.Thread(target=self._run, args=(self._end,), name="progress", daemon=True).start()
+            self._printer = threading.Thread(target=self._run, args=(self._end,), name="progress", daemon=True)
+            self._printer.start()
 
     def stop(self) -> None:
-        """Print no more, until the next start."""
-        if self._end is not None:
+        """Print no more, until the next start. A line that is being printed is finished: it may not fall into what is printed next."""
+        if self._end is not None and self._printer is not None:
             self._end.set()
-            self._end = None
+            self._printer.join()
+            self._end = self._printer = None
 
     def _run(self, end: threading.Event) -> None:
         while not end.wait(self._pause()):
