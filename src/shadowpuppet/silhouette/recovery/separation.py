@@ -29,6 +29,8 @@ CALM_WEIGHT = 0.02
 """Weight in the person's colours of an enclosed pixel that is covered, against one that is passed over in all frames."""
 CALM_SHARE = 0.25
 """Least area of a part of such pixels over that of the largest."""
+VARIANT = 2.0
+"""Distance of a mode from the scene's at the pixel, over a mode's radius, up to which it is the scene in another light, not the person."""
 PART_SHARE, PART_COLOUR = 0.02, 0.5
 """Least area of a covered part over that of the largest one, and least log ratio of its colours over the largest one's."""
 CONNECTED = 0.8
@@ -63,6 +65,8 @@ class _Field(NamedTuple):
     still: Floats
     """Median Y, Cr, Cb, of shape (H, W, 3), which is the scene's outside the region."""
     frames: int
+    radius: Floats
+    """Of a mode in Y, Cr, Cb, of shape (3,), grey levels."""
 
 
 class _Found(NamedTuple):
@@ -83,8 +87,8 @@ class _Found(NamedTuple):
 
 def _rounds(planes: Floats, movement: Movement) -> _Found:
     """The labels after `ROUNDS` rounds on frames' planes (N, H, W, 3)."""
-    modes = temporal_modes(planes[:, movement.region], radius_of(movement.noise))
-    field = _Field(modes, movement, _middle(planes), len(planes))
+    radius = radius_of(movement.noise)
+    field = _Field(temporal_modes(planes[:, movement.region], radius), movement, _middle(planes), len(planes), radius)
     between = pair_costs(*_on_picture(field), movement.region)
     labels, ratio, below = None, np.zeros(0), np.zeros(0, bool)
     for _ in range(ROUNDS):
@@ -166,7 +170,8 @@ def _colour_ratio(field: _Field, labels: NDArray[np.intp] | None, below: NDArray
     sure = np.flatnonzero((labels < COUNT) & ~below)
     scene = np.concatenate([still, modes.colour[sure, labels[sure]]])
     passing = modes.share[uncovered]
-    passing[np.arange(len(uncovered)), labels[uncovered]] = 0
+    own = modes.colour[uncovered, labels[uncovered]]
+    passing[(np.abs(modes.colour[uncovered] - own[:, None]) <= VARIANT * field.radius).all(2)] = 0
     calm = _calm(field, labels)
     weights = np.concatenate([passing.reshape(-1), np.full(np.count_nonzero(calm), CALM_WEIGHT)])
     person = colour_model(np.concatenate([modes.colour[uncovered].reshape(-1, 3), modes.colour[calm, 0]]), weights)
