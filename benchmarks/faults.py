@@ -193,8 +193,8 @@ class Figures(NamedTuple):
     row: Row
     runs: list[tuple[Measures, Measures]]
     usual: list[Array]
-    """For each run the error of its clean film by frame, (T,), metres, the mean over all seeds: with one seed it may be half as large as with
-    the next."""
+    """For each run the error of its clean film by frame, (T,), metres, the mean over all seeds: with one seed it may be half as large as
+    with the next."""
 
     def spans(self, one: Measures) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Which frames are before, in and after the fault, of shape (T,) each, true or false."""

@@ -142,7 +142,7 @@ def test_track_tells_what_it_found_and_what_came_out(shell, recording, tmp_path)
     assert "exact masks" not in out
     for word in ("camera     cam, 160 x 120 pixels, 60 degrees wide, calibrated",
                  f"film       {made.FRAMES} frames, 8 frames/s", "scale", "person", f"frames   {made.FRAMES}",
-                 "doubt    outline fits in", "joint errors, mm", "left_hand", "frames/s (ms a frame: decode"):
+                 "doubt    ", "legs     not tracked; --body anatomical", "joint errors, mm", "left_hand", "frames/s (ms a frame: decode"):
         assert word in out
     assert "run-tiny/joints.csv" in out
     assert (tmp_path / "run-tiny" / "joints.csv").exists()
@@ -433,7 +433,7 @@ def test_no_references_no_height_no_distance(shell, recording, tmp_path):
     bare = made.copied(recording, tmp_path / "bare", without=["references", "recording.toml"])
     code, out, err = shell("track", bare, "-o", "run", "--preset", "liu2011", "--verbose", *QUICK)
     assert code == 0
-    assert "height not known, so no length is: give --height" in out
+    assert "height not known: all lengths are guesses; give --height" in out
     assert "average height of 1.70 m, assumed" in out
     assert err.count("warning: neither height nor distance is known") == 1
     assert len(read_run(tmp_path / "run").motion) == made.FRAMES

@@ -128,7 +128,7 @@ def test_how_far_cameras_disagree(printed):
     assert printed(check_table(check())) == [
         "recording lab", "compared 240 sets of silhouettes, 25 a second, of 50 frames/s",
         "limit 12.8 px; cameras that fit are apart by about one",
-        "seen 1.76 m from end to end, with hair, shoes and what is held up", "camera disagrees by with late by 90 % within",
+        "seen 1.76 m tall, hair, shoes and raised hands included", "camera disagrees by with late by 90 % within",
         "a 1.0 px 2 others 0.0 frames ± 0.1", "b unknown 1 others cannot tell", "c 9.0 px 2 others 2.2 frames ± 0.3 wrong: place and time",
         "verdict this", "that",
     ]  # fmt: skip
@@ -197,4 +197,4 @@ def test_how_a_live_session_went(printed):
     assert more[1] == "smoothed 150 ms from capture, for the display and other programs"
     assert more[3] == "breaks 2 times no pictures came"
     slow = printed(pairs(_live_rows(live | {"frames_per_s": 5.0})))
-    assert "too slow only one picture in 5 is tracked: use fewer cameras" in " ".join(slow)
+    assert "too slow only one picture in 5 is tracked: use a lower --rate" in " ".join(slow)

@@ -62,8 +62,8 @@ def test_the_look_at_several_cameras(printed):
         "camera pixels wide stands at, m person exact apart",
         "a 640 x 480 46° 1.0 -2.2 1.5 5.1 %",
         "b 640 x 480, as 320 x 240 46° 1.0 -2.2 1.5 5.1 % 0.950 1.2 px", "",
-        "background background/<camera>.mp4", "told by colour", "seen 1.80 m from end to end, with hair, shoes and what is held up",
-        "person sizes from training; overlaps the first silhouettes by 0.91; 12 mm from their hulls",
+        "background background/<camera>.mp4", "told by colour", "seen 1.80 m tall, hair, shoes and raised hands included",
+        "person sizes from training; overlaps the first silhouettes by 0.91; 12 mm from body to surface points (rms)",
     ]  # fmt: skip
     look.cameras[1].exact_overlap, look.person, look.agreement.height, look.frames = None, None, None, None
     found = printed(_rig_table(look))

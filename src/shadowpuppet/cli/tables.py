@@ -70,7 +70,7 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], rig
 
 def seen_height(height: float | None) -> str | None:
     """The height (m) that the cameras agree on, in words; it is not the person's, which is given or measured."""
-    return None if height is None else f"{height:.2f} m from end to end, with hair, shoes and what is held up"
+    return None if height is None else f"{height:.2f} m tall, hair, shoes and raised hands included"
 
 
 def verdict_table(verdict: Verdict, title: str = "verdict") -> RenderableType:
@@ -107,6 +107,7 @@ def metrics_table(metrics: Mapping[str, Any]) -> RenderableType:
     rows: list[tuple[str, str | None]] = [
         ("frames", f"{metrics['frames']}: {statuses}" if statuses else "none"),
         ("doubt", doubt_text(metrics)),
+        ("legs", "not tracked; --body anatomical tracks them where the film shows them" if _lacks_legs(metrics) else None),
         ("overlap", f"{overlap['mean']:.3f}, {overlap_sense(overlap['mean'])} (IoU of body and silhouette; p5 {overlap['p5']:.3f})"
                     if overlap["count"] else None),
         ("cost", f"{scale * cost['mean']:.{digits}f} {unit} (p95 {scale * cost['p95']:.{digits}f})" if cost["count"]
@@ -125,6 +126,12 @@ def metrics_table(metrics: Mapping[str, Any]) -> RenderableType:
                          if known != frames and "clock" not in metrics else None),
         ]  # fmt: skip
     return pairs(rows)
+
+
+def _lacks_legs(metrics: Mapping[str, Any]) -> bool:
+    """Whether a run is of a body without legs."""
+    limbs = metrics.get("limb_status")
+    return bool(limbs) and not any(limb.endswith("leg") for limb in limbs)
 
 
 def people_table(people: Mapping[Any, Mapping[str, Any]]) -> RenderableType:

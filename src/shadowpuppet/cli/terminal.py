@@ -63,16 +63,21 @@ class _Log(LogLines):
 
     def __init__(self, console: Console) -> None:
         super().__init__(console, self._text, lambda: LOG_EVERY)
-        self.what, self.total, self.done, self.began = "", None, 0, 0.0
+        self.what, self.total, self.done, self.before, self.began = "", None, 0, 0, 0.0
 
     def begin(self, what: str, total: int | None) -> None:
         """A phase begins; the thread that prints starts with the first."""
-        self.what, self.total, self.done, self.began = what, total, 0, monotonic()
+        self.what, self.total, self.done, self.before, self.began = what, total, 0, 0, monotonic()
         self.start()
+
+    def advance(self, frames: int) -> None:
+        """Number of frames done; those before the first call are an earlier run's, which is resumed."""
+        self.done, self.before = frames, self.before if self.done else frames - 1
 
     def _text(self) -> str:
         seconds = monotonic() - self.began
-        count = f" {self.done}{f'/{self.total}' if self.total else ''}, {self.done / seconds:.1f} a second" if self.done else ""
+        speed = f"{(self.done - self.before) / seconds:.1f} a second"
+        count = f" {self.done}{f'/{self.total}' if self.total else ''}, {speed}" if self.done else ""
         return f"{self.what}{count}, {seconds:.0f} s"
 
 
@@ -119,7 +124,7 @@ class Terminal(LiveListener):
         """Show the number of frames done and the speed."""
         self.frames = frames
         if self._log is not None:
-            self._log.done = frames
+            self._log.advance(frames)
         if self._task is not None and not self._progress.disable:
             task = self._progress.tasks[-1]
             total = f"/{task.total:.0f}" if task.total else ""

@@ -273,8 +273,8 @@ def _live_rows(live: Mapping[str, Any]) -> list[tuple[str, str | None]]:
                         f"{late['p95']:.0f} ms ({frames['p95']:.2f})"),
             ("smoothed", f"{smoothed['median']:.0f} ms from capture, for the display and other programs" if smoothed else None),
             ("speed", f"{live['frames_per_s']:.1f} frames/s of {1000 / live['interval_ms']:.1f}; {live['dropped']} dropped"),
-            ("too slow", f"only one picture in {1 / share:.0f} is tracked: use fewer cameras, or a lower --rate; play a film slower, "
-                         "with --speed below 1" if 0 < share < KEEPS_UP else None),
+            ("too slow", f"only one picture in {1 / share:.0f} is tracked: use a lower --rate or --max-size, or fewer cameras; play a film "
+                         "slower, with --speed below 1" if 0 < share < KEEPS_UP else None),
             ("breaks", f"{live['breaks']} times no pictures came" if live["breaks"] else None)]
 
 

@@ -38,14 +38,14 @@ def overlap_sense(overlap: float) -> str:
 
 
 def doubt_text(metrics: Mapping[str, Any]) -> str | None:
-    """In how many frames the outline fits, and in what share of frames each limb is not vouched for; None if unknown or without frames."""
+    """In what share of frames each limb is not vouched for, and in how many frames the outline fits; None if unknown or without frames."""
     limbs, frames = metrics.get("limb_status"), metrics["frames"]
     if not limbs or not frames:
         return None
     shares = {limb.replace("_", " "): sum(counts.get(status, 0) for status in DOUBTFUL) / max(_placed(counts), 1)
               for limb, counts in limbs.items()}
     doubtful = ", ".join(f"{limb} in {_percent(share)}" for limb, share in shares.items() if share).replace(" in ", " doubtful in ", 1)
-    return f"outline fits in {metrics['status'].get('tracked', 0)} of {frames} frames; {doubtful or 'no limb doubtful'}"
+    return f"{doubtful or 'no limb doubtful'}; the outline as a whole fits in {metrics['status'].get('tracked', 0)} of {frames} frames"
 
 
 def _placed(counts: Mapping[str, int]) -> int:

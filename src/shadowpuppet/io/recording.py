@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import count, takewhile
@@ -87,11 +87,13 @@ class Recording:
     """The whole recording, where this is a part of it (`--start`, `--end`); None otherwise."""
 
 
-def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None) -> Recording:
+def read_recording(path: str | Path | int, *, fov: float | None = None, calibration: Path | None = None,
+                   asked: Sequence[str] | None = None) -> Recording:
     """Read a recording: a folder (video/ or films, calibration.toml, ...), another program's project (`io.projects`), or one film, folder
     of pictures or live camera.
 
-    `calibration` replaces the folder's; `fov` (horizontal, radians) suffices for one camera. Raises `RecordingError`,
+    `calibration` replaces the folder's; `fov` (horizontal, radians) suffices for one camera; `asked`: cameras that will be used, all if
+    left out: films of others may be unknown to the calibration. Raises `RecordingError`,
     `CalibrationError` or `VideoError`, naming file and field, if something is missing or does not fit.
     """
     folder = Path(str(path))
@@ -104,7 +106,7 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
         raise RecordingError(f"{folder}: no such recording, expected a folder with video/ and calibration.toml, or a film"
                              f"{_like(folder)}")
     if project is not None or (folder.is_dir() and (_is_own(folder) or films_in(folder))):
-        return _read_folder(project.folder if project else folder, fov, calibration, project)
+        return _read_folder(project.folder if project else folder, fov, calibration, project, asked)
     if folder.is_dir() and not any(p.suffix.lower() in IMAGE_SUFFIXES for p in folder.iterdir()):
         raise RecordingError(f"{folder}: found neither films nor video/ nor calibration.toml nor pictures in it, expected a "
                              "recording (<camera>.mp4 or video/<camera>.mp4, and calibration.toml) or a folder of pictures")
@@ -142,7 +144,8 @@ def is_recording(folder: Path) -> bool:
     return noted or find_project(folder) is not None or bool(films_in(folder))
 
 
-def _read_folder(folder: Path, fov: float | None, calibration: Path | None, project: Project | None) -> Recording:
+def _read_folder(folder: Path, fov: float | None, calibration: Path | None, project: Project | None,
+                 asked: Sequence[str] | None) -> Recording:
     """A recording folder; what it does not say is as the project of another program says."""
     notes = RecordingNotes(folder)
     height = notes.number("height", HEIGHTS, "metres", "subject")
@@ -160,11 +163,11 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
     if project is not None:
         cameras = _in_order(cameras, films, project)
     for kind, sources in (("video", films), ("background", backgrounds), ("masks", masks)):
-        _check_names(folder / kind, sources, cameras)
+        _check_names(folder / kind if (folder / kind).is_dir() else folder, sources, cameras, asked, kind)
     missing = [c.name for c in cameras if c.name not in films]
     if missing:
         warn(f"{folder}: no film of {choices(missing)}; going on with {choices(films)}")
-    starts = _starts(notes, cameras)
+    starts = _starts(notes, cameras, asked)
     views = tuple(_without_padding(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), starts.get(c.name, 0.0)))
                   for c in cameras if c.name in films)
     _check_sizes(views)
@@ -205,9 +208,9 @@ def _truths(folder: Path) -> tuple[Path, ...]:
     return tuple(found)
 
 
-def _starts(notes: RecordingNotes, cameras: Iterable[Camera]) -> dict[str, float]:
+def _starts(notes: RecordingNotes, cameras: Iterable[Camera], asked: Sequence[str] | None) -> dict[str, float]:
     """`View.start` by camera, from recording.toml."""
-    _check_names(notes.path, notes.table("start"), cameras)
+    _check_names(notes.path, notes.table("start"), cameras, asked)
     found = {name: notes.number(name, STARTS, "seconds", "start") for name in notes.table("start")}
     return {name: start for name, start in found.items() if start is not None}
 
@@ -253,12 +256,14 @@ def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration
     return (Camera.from_fov(open_frames(film).size, fov, name),)
 
 
-def _check_names(folder: Path, sources: Iterable[str], cameras: Iterable[Camera]) -> None:
+def _check_names(place: Path, sources: Iterable[str], cameras: Iterable[Camera], asked: Sequence[str] | None, kind: str = "") -> None:
+    """Raise `RecordingError` if there is something of a camera that the calibration does not know, and that is `asked` for (None: all)."""
     known = [camera.name for camera in cameras]
-    unknown = sorted(set(sources) - set(known))
+    unknown = sorted(name for name in set(sources) - set(known) if asked is None or name in asked)
     if unknown:
-        raise RecordingError(f"{folder}: found {choices(unknown)}, but the calibration knows no such camera; cameras known: "
-                             f"{choices(known)}")
+        remedy = "; a film has the name of its camera; --camera leaves films out" if kind == "video" else ""
+        raise RecordingError(f"{place}: found {choices(unknown)}, but the calibration knows no such camera; cameras known: "
+                             f"{choices(known)}{remedy}")
 
 
 def _without_padding(view: View) -> View:

@@ -36,6 +36,20 @@ def doubtful_limbs(joints: Iterable[str], statuses: Iterable[str] | None) -> lis
     return [limb for limb, status in zip(limbs_of(joints), () if statuses is None else statuses) if status in DOUBTFUL]
 
 
+def limbs_in_words(limbs: Iterable[str]) -> str:
+    """Limbs in words, left and right together: `trunk, both arms`."""
+    there = list(limbs)
+    words = [f"both {limb.removeprefix('left_')}s" if limb.startswith("left_") and limb.replace("left", "right") in there else limb
+             for limb in there if not (limb.startswith("right_") and limb.replace("right", "left") in there)]
+    return ", ".join(words).replace("_", " ")
+
+
+def status_in_words(status: str, joints: Iterable[str], statuses: Iterable[str] | None) -> str:
+    """A frame's status, and which limbs of a body with these joints are doubtful; `statuses` as in `doubtful_limbs`."""
+    doubtful = limbs_in_words(doubtful_limbs(joints, statuses))
+    return f"{status}, {doubtful} doubtful" if doubtful else status
+
+
 def doubtful_joints(joints: Iterable[str], statuses: Iterable[str] | None) -> frozenset[str]:
     """Those of joints that belong to `doubtful_limbs`."""
     joints = tuple(joints)

@@ -128,7 +128,8 @@ def open_recording(path: str | Path, options: Options) -> Recording:
     Raises `RecordingError`, `CalibrationError`, `VideoError` or `SettingsError`.
     """
     fov = None if options.fov is None else float(np.radians(options.fov))
-    recording = read_recording(path, fov=fov, calibration=options.calibration)
+    asked = None if options.camera is None else names_in(options.camera)
+    recording = read_recording(path, fov=fov, calibration=options.calibration, asked=asked)
     subject = recording.subject
     return cut(replace(recording, subject=replace(subject, height=options.height or subject.height,
                                                   distance=options.distance or subject.distance)), options)
@@ -152,10 +153,15 @@ def cut(recording: Recording, options: Options) -> Recording:
     return replace(recording, begin=begin, duration=end if np.isfinite(end) else None, whole=recording)
 
 
+def names_in(text: str) -> list[str]:
+    """Names with commas between them."""
+    return [name.strip() for name in text.split(",")]
+
+
 def chosen_views(recording: Recording, names: str | None) -> tuple[View, ...]:
     """Views of the cameras `names` (separated by commas), or all. Raises `RecordingError` for unknown or repeated names."""
     views = {view.camera.name: view for view in recording.views}
-    asked = [name.strip() for name in names.split(",")] if names is not None else list(views)
+    asked = list(views) if names is None else names_in(names)
     for name in asked:
         if name not in views or asked.count(name) > 1:
             raise RecordingError(f"{recording.path}: camera: found {names!r}, expected one of {choices(views)}; or some, each once, "

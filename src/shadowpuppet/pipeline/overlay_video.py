@@ -9,7 +9,7 @@ import numpy as np
 from shadowpuppet.camera.drawing import BLACK, LEGEND, SILHOUETTE_ONLY, WHITE, draw_model, in_colour, said_of, write_text, write_words
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.motion.limbs import LIMBS, doubtful_limbs
+from shadowpuppet.motion.limbs import LIMBS, status_in_words
 from shadowpuppet.motion.motion import BLANK, MotionFrame
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
@@ -17,6 +17,8 @@ from shadowpuppet.video import Image
 
 WIDEST, TALLEST = 1600, 1000
 """Largest width and height of the grid, pixels."""
+LEAST_SIZE = 360
+"""Height, pixels, of the smallest picture that the legend and the caption are scaled for."""
 SHOWN = 0.55
 """Opacity of the model."""
 
@@ -30,14 +32,13 @@ def overlay_grid(frames: FrameSet, found: MotionFrame, pictures: Sequence[Pictur
     if found.status in BLANK and last is not None:
         pale = last._replace(limb_status=["predicted"] * len(LIMBS))
         return _grid(frames, [(pale, pictures)], said_of(found.status, last.time))
-    named = ", ".join(doubtful_limbs(pictures[0].body.landmark_names, found.limb_status)).replace("_", " ")
-    return _grid(frames, [(found, pictures)], found.status if not named else f"{found.status}, {named} doubtful")
+    return _grid(frames, [(found, pictures)], status_in_words(found.status, pictures[0].body.landmark_names, found.limb_status))
 
 
 def overlay_of_people(frames: FrameSet, people: Sequence[tuple[int, MotionFrame, Sequence[Picture]]]) -> Image:
     """As `overlay_grid`, with several people: number, frame and the body as each camera sees it. Without people the images alone."""
     words = ", ".join(f"person {number} {found.status}" for number, found, _ in people)
-    return _grid(frames, [(found, pictures) for _, found, pictures in people], words or "nobody yet")
+    return _grid(frames, [(found, pictures) for _, found, pictures in people], words or "no person yet")
 
 
 def _grid(frames: FrameSet, people: Sequence[tuple[MotionFrame, Sequence[Picture]]], words: str) -> Image:
@@ -57,8 +58,10 @@ def _grid(frames: FrameSet, people: Sequence[tuple[MotionFrame, Sequence[Picture
         drawn = [(pictures[n], found) for found, pictures in people if found.pose is not None]
         _fit(tile, None if image is None else _tile(image, mask, drawn))
         write_text(tile, name if image is not None else f"{name}: no picture", 0, WHITE, size=height)
-    write_words(out, out.shape[0] - 65, (*LEGEND, ("outline: silhouette", SILHOUETTE_ONLY)), max(360, height))
-    write_text(out, f"{frames.time:.2f} s  {words}", out.shape[0] - 40, WHITE, size=max(360, height))
+    size = max(LEAST_SIZE, height)
+    legend, caption = (out.shape[0] - round(up * size / LEAST_SIZE) for up in (65, 40))
+    write_words(out, legend, (*LEGEND, ("outline: silhouette", SILHOUETTE_ONLY)), size)
+    write_text(out, f"{frames.time:.2f} s  {words}", caption, WHITE, size=size)
     return out
 
 

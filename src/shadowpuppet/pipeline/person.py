@@ -20,6 +20,7 @@ from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution, RecordingError
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
+from shadowpuppet.motion.limbs import status_in_words
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, Footage
 from shadowpuppet.pipeline.look import Look, Survey
@@ -152,7 +153,8 @@ class MonocularSubject(TrackedSubject):
         assert image is not None
         pose = np.full(len(self.body.skeleton.dofs), np.nan) if found.pose is None else np.asarray(found.pose)
         ignored = mask & self.picture.legs(pose) if found.pose is not None and self.tracker.settings.ignore_legs else None
-        return overlay_frame(image, mask, self.picture, pose, status=found.status, time=found.time, overlap=found.overlap, ignore=ignored,
+        status = status_in_words(found.status, self.body.landmark_names, found.limb_status)
+        return overlay_frame(image, mask, self.picture, pose, status=status, time=found.time, overlap=found.overlap, ignore=ignored,
                              doubtful=doubtful_names(self.body, found.limb_status),
                              last=None if last is None or last.pose is None else (last.pose, last.time))
 

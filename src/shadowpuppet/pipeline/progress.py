@@ -56,8 +56,9 @@ class Listener:
 class Steps:
     """Names, for a listener, what a look is doing: with each of the cameras that are looked at in parallel. For several threads."""
 
-    def __init__(self, listener: Listener | None, names: Sequence[str]) -> None:
-        """`names`: of all cameras."""
+    def __init__(self, listener: Listener | None, names: Sequence[str], again: bool = False) -> None:
+        """`names`: of all cameras; `again`: whether they are looked at a second time, knowing where the person is."""
+        self.looking = "looking again" if again else "looking"
         self.listener, self.names, self.now, self.lock = listener or Listener(), tuple(names), dict[str, str](), threading.Lock()
 
     def __call__(self, what: str, camera: str | None = None) -> None:
@@ -72,7 +73,7 @@ class Steps:
             told = "; ".join(f"{_listed(cameras)}: {step}" if all(cameras) else step for step, cameras in doing.items())
             done = sum(not step for step in self.now.values())
             films = f", {done}/{len(self.names)} films" if camera and len(self.names) > 1 else ""
-            self.listener.begin(f"looking{films}: {told}" if told else f"looking{films}")
+            self.listener.begin(f"{self.looking}{films}: {told}" if told else f"{self.looking}{films}")
 
 
 def _listed(cameras: Sequence[str]) -> str:

@@ -118,7 +118,7 @@ def test_it_is_the_same_each_time_and_leaves_the_frames_alone(rng):
 
 
 def before_blue(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """A person in black (picture, mask) before a blue wall of many shades, whose shadow on it moves; arms hang, but for one frame in five."""
+    """A person in black (picture, mask) before a blue wall of many shades, whose shadow on it moves; arms hang but in every fifth."""
     y, x = np.mgrid[: SIZE[0], : SIZE[1]]
     wall = np.stack([200 + 40 * np.sin(x / 30), 25 + 12 * np.cos(y / 25), 3 + 0 * x], -1)
     mask, sway = np.zeros(SIZE, np.uint8), round(1.5 * np.sin(1.7 * n))

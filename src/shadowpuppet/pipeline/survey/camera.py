@@ -38,10 +38,10 @@ UNEVEN = 0.1
 """Jitter over the frame interval above which the film's rate counts as variable."""
 
 
-def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (SceneHint(),), listener: Listener | None = None) -> Survey:
+def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), listener: Listener | None = None) -> Survey:
     """Examine a recording of one camera; `hints` as in `survey_film`. Raises a `ShadowPuppetError` if something cannot be used."""
-    footage, steps = rig.footage[0], Steps(listener, rig.names)
-    film = survey_film(footage, options, hint=hints[0], steps=steps)
+    footage, steps = rig.footage[0], Steps(listener, rig.names, again=bool(hints))
+    film = survey_film(footage, options, hint=hints[0] if hints else SceneHint(), steps=steps)
     steps("silhouettes of the first seconds")
     look = _look(footage, film)
     if look.refusal and not options.anyway:
@@ -104,7 +104,7 @@ def _doubts(look: Look, footage: Footage) -> list[Caution]:
                               f"upright film: --fov of a phone is then about {UPRIGHT:.0f}", NOTED))
     if subject.height is None and subject.distance is None:
         doubts.append(Caution(f"neither height nor distance is known: the {look.scale}, and all lengths are as wrong as that is; give "
-                              "--height", "height not known, so no length is: give --height", HARMFUL))
+                              "--height", "height not known: all lengths are guesses; give --height", HARMFUL))
     elif subject.distance is None and not footage.recording.references:
         doubts.append(Caution("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as "
                               "wrong as that; measure it and give --distance, or take references",

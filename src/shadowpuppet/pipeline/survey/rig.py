@@ -34,7 +34,7 @@ RATES, LENGTHS = 0.02, 0.1
 def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), listener: Listener | None = None) -> Survey:
     """Examine each camera's film, and the first seconds of all together; `hints` as in `survey_film`, by camera. Raises a
     `ShadowPuppetError` if something cannot be used."""
-    steps, opening = Steps(listener, rig.names), opening_of(rig)
+    steps, opening = Steps(listener, rig.names, again=bool(hints)), opening_of(rig)
 
     def surveyed(footage: Footage, hint: SceneHint) -> FilmSurvey:
         return survey_film(footage, options, brief_length(footage, options), hint, steps, opening)

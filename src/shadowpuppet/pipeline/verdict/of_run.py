@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
-from shadowpuppet.motion.limbs import DOUBTFUL
+from shadowpuppet.motion.limbs import DOUBTFUL, limbs_in_words
 from shadowpuppet.motion.metrics import LOST_ERROR
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.pipeline.look import Look, RigLook
@@ -35,7 +35,8 @@ def verdict_of_run(look: Look | RigLook, motion: Motion, aside: Sequence[Mapping
     """The verdict on a run of a recording, from what the look found and what the run states of itself; `aside`: the entry `set_aside` of
     metrics.json."""
     cameras = len(look.cameras) if isinstance(look, RigLook) else 1
-    return verdict_of(chain(_cautions(motion, cameras, blind_frames(motion, aside, cameras)), _without_cameras(aside, len(motion)), look.doubts))
+    of_motion = _cautions(motion, cameras, blind_frames(motion, aside, cameras))
+    return verdict_of(chain(of_motion, _without_cameras(aside, len(motion)), look.doubts))
 
 
 def lost_share(motion: Motion) -> float:
@@ -85,9 +86,20 @@ def _cautions(motion: Motion, cameras: int, blind: NDArray[np.bool_]) -> Iterato
         short = f"joints may be off by {1000 * error:.0f} mm on average"
         yield Caution(short, short, RUINOUS if error > FAR[kind] else HARMFUL)
     shares = {limb: float(np.isin(motion.limb_status[:, n], DOUBTFUL).mean()) for n, limb in enumerate(motion.limbs)}
-    for limb, share in sorted(shares.items(), key=lambda item: -item[1]):
-        short = f"{limb.replace('_', ' ')} doubtful in {100 * share:.0f} % of frames"
-        if share > OFTEN_DOUBTFUL[kind]:
-            yield Caution(short, short, HARMFUL)
-        elif share > OFTEN_LOST:
-            yield Caution(short, short, NOTED)
+    often = [limb for limb, share in shares.items() if share > OFTEN_DOUBTFUL[kind]]
+    at_times = [limb for limb, share in shares.items() if OFTEN_LOST < share <= OFTEN_DOUBTFUL[kind]]
+    for limbs, weight in ((often, HARMFUL), (at_times, NOTED)):
+        for named, least, most in _together(limbs, shares):
+            share = f"{least:.0f}" if round(least) == round(most) else f"{least:.0f} to {most:.0f}"
+            short = f"{named} doubtful in {share} % of frames"
+            yield Caution(short, short, weight)
+
+
+def _together(limbs: Sequence[str], shares: Mapping[str, float]) -> list[tuple[str, float, float]]:
+    """Limbs in words, arms and legs together so that they take one reason, and the least and greatest per cent of their frames, the most
+    doubtful first."""
+    kinds = dict[str, list[str]]()
+    for limb in limbs:
+        kinds.setdefault(limb.rpartition("_")[2], []).append(limb)
+    found = [(limbs_in_words(some), [100 * shares[limb] for limb in some]) for some in kinds.values()]
+    return sorted(((named, min(values), max(values)) for named, values in found), key=lambda one: -one[2])
