@@ -182,10 +182,10 @@ def boxes(sizes: CardboxSizes) -> Body:
 
 
 def rounded(sizes: CardboxSizes) -> Body:
-    """Hulls of ellipsoids, with neck, sloping shoulders and flat open hands, from the same 18 sizes. Not in the paper. Two crossed cards look
-    0.7 times as wide when a limb has rolled by 45 degrees; a hull does not, so its width shows the distance. A hand's breadth lies along the
-    forearm's X, thumb up where a bent forearm points forward; `hand_width` is its thickness, which level arms, palms down, show. The shares
-    were fitted to made people in known poses."""
+    """Hulls of ellipsoids, with neck, sloping shoulders and flat open hands, from the same 18 sizes. Not in the paper. Two crossed cards
+    look 0.7 times as wide when a limb has rolled by 45 degrees; a hull does not, so its width shows the distance. A hand's breadth lies
+    along the forearm's X, thumb up where a bent forearm points forward; `hand_width` is its thickness, which level arms, palms down, show.
+    The shares were fitted to made people in known poses."""
     s, skeleton = sizes, upper_body_skeleton(sizes, clavicles=True)
     crown = s.torso_height + s.neck_gap + s.head_height
     neck, arm, fore, palm = 0.335 * s.head_width, s.upper_arm_width / 2, s.elbow_width / 2, s.hand_width / 2
