@@ -233,7 +233,8 @@ def test_of_so_many_frames_one_is_tracked(recording, run, tmp_path):
     third = track_recording(recording, tmp_path / "run", make_options(QUICK | {"every": 3, "overlay": True}), Told())
     times = [frame.time for frame in open_frames(recording / "video" / "cam.mp4")]
     assert third.motion.times == pytest.approx(times[::3], abs=1e-6)
-    assert said[-2:] == [("tracking", len(third.motion)), ("smoothing", None)]
+    number = len(third.motion)
+    assert said[-3:] == [("tracking", number), ("tracking backward", number), ("smoothing", None)]
     assert open_frames(third.folder / "overlay.mp4").rate == pytest.approx(open_frames(run.folder / "overlay.mp4").rate / 3)
 
 
@@ -386,7 +387,7 @@ def test_the_motion_is_smoothed_at_the_end_and_is_one_of_the_body(run):
     raw, found = read_raw(run.folder / "raw.csv", "rounded"), read_run(run.folder)
     assert found.info["smoothing"] == {"method": "tracker", "gaps_s": 0.5, "bridged_frames": 0, "turned_frames": 0,
                                        "reversed_frames": 0}
-    assert jitter(found.motion.table) < 0.7 * jitter(raw.table)
+    assert jitter(found.motion.table) < 0.8 * jitter(raw.table)
     np.testing.assert_array_equal(found.motion.joint_sd, run.motion.joint_sd)
     body = make_body("rounded", read_person(run.folder / "person.toml", "rounded").sizes)
     own = body.points(found.motion.poses, names=found.motion.joint_names)
