@@ -28,6 +28,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "default": {},
     "default, exact masks": {"masks": True},
     "default, exact masks, true arms": {"masks": True, "true_arms": True},
+    "default, forward only": {"tracker": {"both_ways": False}},
     "default, cardbox": {"tracker": {"body": "cardbox"}},
     "default, plain masks (eq. 1)": {"silhouette": {"method": "averaging"}},
     "default, no references": {"references": False},

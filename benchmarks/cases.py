@@ -20,9 +20,10 @@ from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import fit_monocular
 from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.pipeline.survey.camera import survey_camera
-from shadowpuppet.tracking.monocular.settings import MonocularSettings
+from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+from shadowpuppet.tracking.smoothing.both_ways import backward_share, near_profile
 
 ALIGNED = [name.replace("hand", "wrist") for name in UPPER_JOINTS]
 COLUMNS = ("mean", "sd", "plane", "depth", "far", "aligned", "shoulder", "elbow", "hand", "cost", "jitter", "ms")
@@ -66,17 +67,20 @@ class Case:
         return fit_monocular(rng, self.survey, options).fit.guess
 
     def track(self, person: PersonEstimate, settings: MonocularSettings, rng: np.random.Generator) -> dict[str, float]:
-        """Run a tracker and measure it: millimetres, percent, pixels, m/s^2 and milliseconds a frame."""
+        """Run a tracker, both ways if the settings say so, and measure it: millimetres, percent, pixels, m/s^2 and milliseconds a
+        frame."""
         picture = person.picture(self.camera, settings.body)
         tracker = MonocularTracker(picture, settings)
-        states = [tracker.start(rng, self.masks[0])]
-        start = time.process_time()  # what else the machine does is not counted
-        for mask in self.masks[1:]:
-            states.append(tracker.step(rng, states[-1], mask))
-        spent = time.process_time() - start
-        table = JointTable(self.times, picture.body.landmark_names, picture.points_world(np.array([state.pose for state in states])))
-        costs = [state.cost for state in states]
-        return self.measure(table) | {"cost": float(np.nanmean(costs)), "ms": 1000 * spent / max(len(states) - 1, 1)}
+        poses, costs, spent = _pass(tracker, rng, self.masks)
+        if settings.both_ways and picture.body.hem is not None:
+            backward, others, more = _pass(tracker, rng, self.masks[::-1])
+            names = picture.body.skeleton.dof_names
+            near = near_profile(names, poses) | near_profile(names, backward[::-1])
+            share = backward_share(self.times, costs, others[::-1], near, pixel_scale(self.camera.size))
+            poses, costs = (1 - share[:, None]) * poses + share[:, None] * backward[::-1], (1 - share) * costs + share * others[::-1]
+            spent += more
+        table = JointTable(self.times, picture.body.landmark_names, picture.points_world(poses))
+        return self.measure(table) | {"cost": float(np.nanmean(costs)), "ms": 1000 * spent / max(len(poses) - 1, 1)}
 
     def measure(self, table: JointTable) -> dict[str, float]:
         """Errors of joints against the truth, and how much the hands shake."""
@@ -89,6 +93,15 @@ class Case:
         jitter = float(np.sqrt((np.linalg.norm(np.diff(hands, 2, axis=0), axis=2) ** 2).mean()) / pace**2)
         return per | {"mean": errors["mean_mm"], "plane": errors["plane_mm"], "depth": errors["depth_mm"], "far": 100 * errors["far"],
                       "aligned": aligned["aligned_mean_mm"], "jitter": jitter}
+
+
+def _pass(tracker: MonocularTracker, rng: np.random.Generator, masks: list[Mask]) -> tuple[Array, Array, float]:
+    """Poses (T, D) and costs (T,) of masks tracked in their order, and the processor time (s) after the first."""
+    states = [tracker.start(rng, masks[0])]
+    start = time.process_time()  # what else the machine does is not counted
+    for mask in masks[1:]:
+        states.append(tracker.step(rng, states[-1], mask))
+    return np.array([state.pose for state in states]), np.array([state.cost for state in states]), time.process_time() - start
 
 
 def means(runs: list[dict[str, float]]) -> dict[str, float]:

@@ -15,7 +15,9 @@ from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body, Hulls, Quads  # fmt: skip
 from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
 from shadowpuppet.body.skeleton import SIDES  # fmt: skip
-from shadowpuppet.body.upper_body import FOREARM, HAND_POINT, TO_TIP, boxes, cardbox, cardbox_bends, rounded  # fmt: skip
+from shadowpuppet.body.upper_body import FOREARM, HALF_BREADTH, HAND_POINT, TO_TIP, boxes, cardbox, cardbox_bends, rounded  # fmt: skip
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.rasterize import Picture, count, place
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 
@@ -200,8 +202,21 @@ def test_rounded_parts_reach_as_far_as_their_sizes_say():
     assert reach("waist", 2)[0] == pytest.approx(-SIZES.waist_height)
     elbow = body.points(body.skeleton.pose()[None], names=["left_elbow"])[0, 0, 2]
     assert reach("left_hand", 2)[0] == pytest.approx(elbow - SIZES.forearm_length)
-    assert np.ptp(reach("left_upper_arm", 0)) == pytest.approx(SIZES.upper_arm_width)
+    assert np.ptp(reach("left_upper_arm", 0)) == pytest.approx(max(SIZES.upper_arm_width, SIZES.elbow_width))
     assert np.ptp(reach("left_hand", 1)) == pytest.approx(SIZES.hand_width)
+    assert np.ptp(reach("left_hand", 0)) == pytest.approx(2 * HALF_BREADTH / TO_TIP * SIZES.forearm_length)
+
+
+def test_a_hand_looks_thin_palm_down_and_broad_palm_forward():
+    """Level arms, palms down, show the thickness; a forearm bent upward beside a level upper arm shows the breadth."""
+    person = rounded(SIZES.with_values(forearm_length=0.45, hand_width=0.03))
+    camera = Camera("cam", (320, 240), np.array([[300.0, 0, 160], [0, 300, 120], [0, 0, 1]]))
+    picture = Picture(person, camera, place(camera, 2.0, -0.2))
+    hand = shapes_of(person, "left_hand")
+    level = {"left_shoulder_abduction": np.pi / 2}
+    down = count(picture.draw(person.skeleton.pose(**level), hand))
+    forward = count(picture.draw(person.skeleton.pose(**level, left_elbow_roll=np.pi / 2, left_elbow_flexion=np.pi / 2), hand))
+    assert forward > 1.8 * down
 
 
 @pytest.mark.parametrize("name", BODIES)

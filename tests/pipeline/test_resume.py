@@ -30,11 +30,14 @@ TABLES = ("joints.csv", "raw.csv", "angles.csv", "intervals.csv", "run.toml", "l
 class Kills(Listener):
     """Keeps the folder of a run as it is when a process is killed after some of its frames."""
 
-    def __init__(self, folder: Path, after: list[int]) -> None:
-        self.folder, self.after = folder, after
+    def __init__(self, folder: Path, after: list[int], phase: str = "tracking") -> None:
+        self.folder, self.after, self.phase, self.now = folder, after, phase, ""
+
+    def begin(self, what: str, total: int | None = None) -> None:
+        self.now = what
 
     def advance(self, frames: int) -> None:
-        if frames in self.after:
+        if frames in self.after and self.now == self.phase:
             shutil.copytree(self.folder, killed(self.folder, frames))
 
 
@@ -90,6 +93,19 @@ def test_a_run_killed_anywhere_goes_on_to_the_same_result(film, tmp_path, monkey
         assert not (left / STATE).exists()
         assert found.metrics["status"] == whole.metrics["status"]
         assert len(made.images(left / "overlay.mp4")) == number
+
+
+def test_a_run_killed_on_its_way_back_goes_on_to_the_same_result(film, tmp_path, monkeypatch):
+    monkeypatch.setattr(progress, "CHECKPOINT_SECONDS", 0.0)
+    folder = tmp_path / "run"
+    whole = film(folder, kills := Kills(folder, [6], "tracking backward"))
+    left = killed(folder, 6)
+    if whole.metrics.get("cameras", 2) != 1:
+        assert kills.now == "smoothing"
+        assert not left.exists()  # several cameras see depth
+        return
+    film(left, resume=True)
+    assert_equal_runs(left, folder)
 
 
 def test_only_the_same_run_goes_on_and_a_complete_one_does_not(film, tmp_path, monkeypatch):

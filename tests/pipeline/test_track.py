@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import tracemalloc
 from dataclasses import replace
+from functools import partial
 
 import made
 import numpy as np
@@ -22,6 +23,7 @@ from shadowpuppet.pipeline.footage import RUN, RUNS, CameraFrame, open_footage, 
 from shadowpuppet.pipeline.options import Options, make_options, plain_options, read_options
 from shadowpuppet.pipeline.prepare import fit_person, look_at
 from shadowpuppet.pipeline.progress import StageTimer
+from shadowpuppet.pipeline.silhouette_cache import MaskStore
 from shadowpuppet.pipeline.silhouettes import learn_silhouettes, read_masks
 from shadowpuppet.pipeline.track import Listener, json_text, track_recording
 from shadowpuppet.video import open_frames
@@ -48,6 +50,31 @@ def test_most_true_positions_are_within_the_intervals_and_few_wrong_joints_are_v
     vouched = motion.limb_status[:, [motion.limbs.index(limb_of(name)) for name in names]] == "tracked"
     assert np.mean(vouched & (np.linalg.norm(off, axis=2) > 0.3)) < 0.01
     assert vouched.mean() > 0.3
+
+
+def test_a_film_is_also_tracked_backward_where_the_run_is_smoothed(recording, tmp_path, monkeypatch):
+    """raw.csv has the forward pass; the backward pass changes joints and statements of doubt, and nothing where it is off."""
+    def tracked(name, **values):
+        phases, options = [], make_options(QUICK | values)
+        listener = Listener()
+        listener.begin = lambda what, total=None: phases.append(what)
+        summary = track_recording(recording, tmp_path / name, options, listener)
+        return summary, phases
+
+    both, phases = tracked("both")
+    assert phases[-2:] == ["tracking backward", "smoothing"]
+    assert both.metrics["backward_s"] > 0
+    once, phases = tracked("once", tracker={**QUICK["tracker"], "both_ways": False})
+    assert "tracking backward" not in phases
+    assert (both.folder / "raw.csv").read_bytes() == (once.folder / "raw.csv").read_bytes()
+    assert np.abs(both.motion.joints - once.motion.joints).max() > 0.005
+    assert np.abs(both.motion.joint_sd - once.motion.joint_sd).max() > 0.005
+    off, phases = tracked("off", smooth="off")
+    assert "tracking backward" not in phases
+    np.testing.assert_allclose(off.motion.joints, read_raw(once.folder / "raw.csv", "rounded").joints, atol=1e-5)
+    monkeypatch.setattr("shadowpuppet.pipeline.track.MaskStore", partial(MaskStore, 1000))
+    long, _ = tracked("long")
+    assert (long.folder / "joints.csv").read_bytes() == (once.folder / "joints.csv").read_bytes()  # too many silhouettes to be kept
 
 
 class Stops(Listener):
@@ -206,7 +233,8 @@ def test_of_so_many_frames_one_is_tracked(recording, run, tmp_path):
     third = track_recording(recording, tmp_path / "run", make_options(QUICK | {"every": 3, "overlay": True}), Told())
     times = [frame.time for frame in open_frames(recording / "video" / "cam.mp4")]
     assert third.motion.times == pytest.approx(times[::3], abs=1e-6)
-    assert said[-2:] == [("tracking", len(third.motion)), ("smoothing", None)]
+    number = len(third.motion)
+    assert said[-3:] == [("tracking", number), ("tracking backward", number), ("smoothing", None)]
     assert open_frames(third.folder / "overlay.mp4").rate == pytest.approx(open_frames(run.folder / "overlay.mp4").rate / 3)
 
 
@@ -359,7 +387,7 @@ def test_the_motion_is_smoothed_at_the_end_and_is_one_of_the_body(run):
     raw, found = read_raw(run.folder / "raw.csv", "rounded"), read_run(run.folder)
     assert found.info["smoothing"] == {"method": "tracker", "gaps_s": 0.5, "bridged_frames": 0, "turned_frames": 0,
                                        "reversed_frames": 0}
-    assert jitter(found.motion.table) < 0.7 * jitter(raw.table)
+    assert jitter(found.motion.table) < 0.8 * jitter(raw.table)
     np.testing.assert_array_equal(found.motion.joint_sd, run.motion.joint_sd)
     body = make_body("rounded", read_person(run.folder / "person.toml", "rounded").sizes)
     own = body.points(found.motion.poses, names=found.motion.joint_names)

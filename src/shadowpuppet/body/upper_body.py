@@ -81,6 +81,8 @@ FOREARM, TO_TIP, HAND_POINT = 0.1535, 0.254, 0.019
 wrist to the base of the fingers as in CMU's mocap skeletons (the bone `lhand`)."""
 WRIST_SHARE, HAND_SHARE = FOREARM / TO_TIP, (FOREARM + HAND_POINT) / TO_TIP
 """Positions of the wrist and the base of the fingers along the forearm's card."""
+HALF_BREADTH = 0.0248
+"""Half the breadth of a hand, fraction of the stature (ANSUR II; Gordon et al. 2014)."""
 
 
 def _landmarks(sizes: CardboxSizes) -> dict[str, tuple[str, tuple[float, float, float]]]:
@@ -180,12 +182,14 @@ def boxes(sizes: CardboxSizes) -> Body:
 
 
 def rounded(sizes: CardboxSizes) -> Body:
-    """Hulls of ellipsoids, with neck, sloping shoulders and hands, from the same 18 sizes. Not in the paper. Two crossed cards look 0.7
-    times as wide when a limb has rolled by 45 degrees; a hull does not, so its width shows the distance."""
+    """Hulls of ellipsoids, with neck, sloping shoulders and flat open hands, from the same 18 sizes. Not in the paper. Two crossed cards
+    look 0.7 times as wide when a limb has rolled by 45 degrees; a hull does not, so its width shows the distance. A hand's breadth lies
+    along the forearm's X, thumb up where a bent forearm points forward; `hand_width` is its thickness, which level arms, palms down, show.
+    The shares were fitted to made people in known poses."""
     s, skeleton = sizes, upper_body_skeleton(sizes, clavicles=True)
     crown = s.torso_height + s.neck_gap + s.head_height
-    neck, arm, fore, palm = 0.35 * s.head_width, s.upper_arm_width / 2, s.elbow_width / 2, s.hand_width / 2
-    wrist = 0.36 * s.elbow_width
+    neck, arm, fore, palm = 0.335 * s.head_width, s.upper_arm_width / 2, s.elbow_width / 2, s.hand_width / 2
+    wrist, breadth, tip = 0.3 * s.elbow_width, HALF_BREADTH / TO_TIP * s.forearm_length, 0.45 * palm
 
     def ellipsoid(joint: str, z: float, depth: float, width: float, height: float):
         return skeleton.joint_index(joint), (0.0, 0.0, z), (depth, width, height)
@@ -197,19 +201,19 @@ def rounded(sizes: CardboxSizes) -> Body:
         return ellipsoid(joint, 0.1 * s.torso_height, s.torso_bottom_depth / 2, s.torso_bottom_width / 2, 0.1 * s.torso_height)
 
     parts = {
-        "head": [ellipsoid("torso", crown - 0.35 * s.head_height, 0.5 * s.head_depth, 0.5 * s.head_width, 0.35 * s.head_height),
-                 ellipsoid("torso", crown - 0.7 * s.head_height, 0.42 * s.head_depth, 0.4 * s.head_width, 0.3 * s.head_height)],
+        "head": [ellipsoid("torso", crown - s.head_height / 2, s.head_depth / 2, s.head_width / 2, s.head_height / 2)],
         "neck": [ball("torso", crown - 0.6 * s.head_height, neck), ball("torso", s.torso_height, neck)],
-        "shoulders": [*(ball(f"{side}_shoulder", 0, arm) for side in SIDES), ball("torso", s.torso_height + neck / 2, neck)],
-        "torso": [ellipsoid("torso", 0.65 * s.torso_height, s.torso_top_depth / 2, 0.44 * s.shoulder_width, 0.3 * s.torso_height),
+        "shoulders": [*(ball(f"{side}_shoulder", 0, arm) for side in SIDES), ball("torso", s.torso_height + neck / 3, neck)],
+        "torso": [ellipsoid("torso", 0.72 * s.torso_height, s.torso_top_depth / 2, 0.44 * s.shoulder_width, 0.3 * s.torso_height),
                   loin("torso")],
         "waist": [loin("pelvis"), ellipsoid("pelvis", -0.9 * s.waist_height, s.waist_depth / 2, s.waist_width / 2, 0.1 * s.waist_height)],
     }
     for side in SIDES:
         shoulder, elbow = f"{side}_shoulder", f"{side}_elbow"
-        parts[f"{side}_upper_arm"] = [ball(shoulder, 0, arm), ball(elbow, 0, 0.9 * fore)]
+        parts[f"{side}_upper_arm"] = [ball(shoulder, 0, arm), ball(elbow, 0, fore)]
         parts[f"{side}_forearm"] = [ball(elbow, -0.06 * s.forearm_length, fore), ball(elbow, -WRIST_SHARE * s.forearm_length, wrist)]
-        parts[f"{side}_hand"] = [ball(elbow, -0.75 * s.forearm_length, palm), ball(elbow, palm / 2 - s.forearm_length, palm / 2)]
+        parts[f"{side}_hand"] = [ellipsoid(elbow, -0.65 * s.forearm_length, breadth, palm, 0.07 * s.forearm_length),
+                                 ellipsoid(elbow, tip - s.forearm_length, breadth, tip, tip)]
     most = max(map(len, parts.values()))
     shapes = [part + [part[-1]] * (most - len(part)) for part in parts.values()]  # a repeated ellipsoid does not change a hull
     joints, centres, radii = (np.array([[ellipsoid[i] for ellipsoid in shape] for shape in shapes]) for i in range(3))

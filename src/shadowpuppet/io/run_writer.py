@@ -160,6 +160,10 @@ class RunWriter:
         if frame.modes:
             self._modes[frame.time] = frame.modes
 
+    def replace_modes(self, modes: Mapping[float, Sequence[Mode]]) -> None:
+        """Replace the other places of limbs in some frames, by time (s), for `revise`."""
+        self._modes |= modes
+
     def __len__(self) -> int:
         """Number of frames so far."""
         return len(self._motion)

@@ -91,6 +91,11 @@ class MonocularSubject(TrackedSubject):
         tracker = MonocularTracker(picture, settings, looks=looks_in(settings.patience, rate))
         return cls(body=picture.body, person=person, fit=fit, tracker=tracker, summary={})
 
+    @property
+    def both_ways(self) -> bool:
+        """Whether a film is tracked backward, too: an upper body's, if the settings say so."""
+        return self.tracker.settings.both_ways and self.body.hem is not None
+
     def beside_in(self, masks: Sequence[Mask]) -> BesideBody | None:
         """What the body leaves unexplained in most of some masks (H, W), in the poses that fit each best; None if nothing is."""
         unexplained, looks = None, max(1, round(MOST * len(masks)))

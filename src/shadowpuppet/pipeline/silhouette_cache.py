@@ -58,8 +58,15 @@ class MaskStore:
 
     def __iter__(self) -> Iterator[FrameSet]:
         """The stored frame sets, without images."""
-        for time, packed, alone in self.sets:
-            yield FrameSet(time, (None,) * len(packed), tuple(map(_unpacked, packed)), own=tuple(map(_unpacked, alone)))
+        yield from map(self._frame_set, range(len(self.sets)))
+
+    def __reversed__(self) -> Iterator[FrameSet]:
+        """The same, the last first."""
+        yield from map(self._frame_set, reversed(range(len(self.sets))))
+
+    def _frame_set(self, n: int) -> FrameSet:
+        time, packed, alone = self.sets[n]
+        return FrameSet(time, (None,) * len(packed), tuple(map(_unpacked, packed)), own=tuple(map(_unpacked, alone)))
 
     def stored(self, frames: Iterable[FrameSet]) -> Generator[FrameSet]:
         """Pass frame sets on, and store their masks."""

@@ -102,6 +102,11 @@ class TrackedSubject(ABC):
             observation = self.observe(each.masks)
             yield Observed(each, observation, time.perf_counter() - start)
 
+    @property
+    def both_ways(self) -> bool:
+        """Whether a film is tracked backward, too."""
+        return False
+
     def left_out(self, state: Any) -> tuple[Mask | None, ...]:
         """For each camera the pixels (H, W) that a tracker's state leaves out of the silhouettes, in masks of any size; None for none."""
         return ()

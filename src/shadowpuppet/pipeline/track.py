@@ -16,7 +16,7 @@ from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError,
 from shadowpuppet.io.people import person_folder
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter, write_metrics
-from shadowpuppet.motion.motion import BLANK, Motion, MotionFrame
+from shadowpuppet.motion.motion import BLANK, Motion, MotionBuilder, MotionFrame
 from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
@@ -42,12 +42,14 @@ from shadowpuppet.pipeline.progress import (
     write_beside,
 )
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig, read_frames
-from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
+from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, floor_entry, joint_names, motion_frame
 from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.threads import one_blas_thread
+from shadowpuppet.tracking.monocular.settings import pixel_scale
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
+from shadowpuppet.tracking.smoothing.both_ways import blended
 from shadowpuppet.tracking.smoothing.butterworth import check_cutoff
 from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother, smoothed_parts
 from shadowpuppet.video import write_frames
@@ -92,8 +94,11 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)
         _check_cutoff(options, prepared.look.rate)
-        leans = _track(writer, prepared, kind, options, listener, for_track, cache)
-        smooth_run(writer, [(0, prepared.check())], options, listener, writer.motion, leans)
+        subject, store = prepared.check(), MaskStore()
+        store = store if subject.both_ways and options.smoothing[0] != "off" else None
+        leans = _track(writer, prepared, kind, options, listener, for_track, cache, store)
+        motion = writer.motion if store is None else _backward(writer, subject, rig, options, listener, store)
+        smooth_run(writer, [(0, subject)], options, listener, motion, leans)
         writer.info |= floor_entry(writer.motion, rig.cameras, prepared.check().person)
     written = read_run(folder)
     metrics = written.metrics | evaluated(rig, written.motion)
@@ -158,6 +163,29 @@ def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]]
     writer.metrics["smooth_s"] = round(time.perf_counter() - start, 3)
 
 
+def _backward(writer: RunWriter, subject: TrackedSubject, rig: Rig, options: Options, listener: Listener, store: MaskStore) -> Motion:
+    """The run's motion blended with that of the same silhouettes tracked backward; as it is if they were too many to be kept."""
+    motion, frames = writer.motion, list[MotionFrame]()
+    if len(store.sets) != len(motion):
+        return motion
+    listener.begin("tracking backward", len(motion))
+    start, rng = time.perf_counter(), np.random.default_rng(options.seed).spawn(3)[2]  # not that of the look or of the forward pass
+    state = before = None
+    for seen in reversed(store):
+        observation = subject.observe(seen.masks)
+        state = subject.next_state(rng, state, observation)
+        found, before = motion_frame(subject, -seen.time, state, observation, before)
+        frames.append(found._replace(time=seen.time))
+        listener.advance(len(frames))
+    builder = MotionBuilder(motion.body_name, motion.dof_names, motion.joint_names)
+    for found in reversed(frames):
+        builder.append(found)
+    both, share = blended(motion, builder.build(), subject.joints, pixel_scale(rig.cameras[0].size))
+    writer.replace_modes({found.time: found.modes for found, weight in zip(reversed(frames), share) if weight > 0.5})
+    writer.metrics["backward_s"] = round(time.perf_counter() - start, 3)
+    return both
+
+
 def _steadied(seen: FrameSet, silhouettes: Sequence[Silhouettes]) -> FrameSet:
     """A frame set with the images of cameras that stand still."""
     images = (None if image is None else each.steadied(image) for each, image in zip(silhouettes, seen.images))
@@ -190,8 +218,9 @@ def _resumed(writer: RunWriter, prepared: Prepared, rng: np.random.Generator) ->
 
 
 def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, listener: Listener, rng: np.random.Generator,
-           cache: SilhouetteCache | None) -> Sequence[float]:
-    """For each frame set: make silhouettes and observation, update the tracker's state, write the result. Returns the `lean` of each."""
+           cache: SilhouetteCache | None, store: MaskStore | None) -> Sequence[float]:
+    """For each frame set: make silhouettes and observation, update the tracker's state, write the result. Returns the `lean` of each.
+    `store`: is filled with the silhouettes."""
     subject, survey, timer = prepared.check(), prepared.survey, StageTimer()
     (look, _, state, before, left_out), earlier = _resumed(writer, prepared, rng)
     writer.begin()
@@ -208,7 +237,9 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
             frames = stack.enter_context(closing(read_frames(survey.rig, segment, ready=options.masks, every=options.every)))
             if cache is not None:
                 frames = stack.enter_context(closing(cache.frames(frames, options)))
-            frames = (seen._replace(masks=watch(seen.time, seen.masks, seen.own)) for seen in frames)
+frames = (seen._replace(masks=watch(seen.time, seen.masks, seen.own)) for seen in frames)
+            if store is not None:
+                frames = stack.enter_context(closing(store.stored(frames)))
             for found, seen in zip(earlier, frames):
                 watch.tracked(subject.drawn(found))
                 leans.append(subject.lean(found, seen.masks))

@@ -75,6 +75,9 @@ class MonocularSettings:
     """Search for a person who is turned, and with a whole body sits, kneels or squats, where one who faces the camera fits badly."""
     patience: NonNegative = 1.0
     """Seconds after which a part of the silhouette that the body does not explain, such as a chair, is left out; 0: never."""
+    both_ways: bool = True
+    """Track a film backward, too, and blend the two motions, where the run is smoothed and the body is an upper one. Takes the time of
+    tracking once more, but not that of the silhouettes."""
     ignore_legs: bool = True
     """Leave the silhouette below the waist, where the model has no legs, out of the cost; no effect for a whole body."""
 
@@ -95,6 +98,7 @@ PRESETS: dict[str, dict] = {
         "posture_weight": 0.0,
         "turned": False,
         "patience": 0.0,
+        "both_ways": False,
     },
 }
 PRESETS["liu2011_printed"] = PRESETS["liu2011"]
