@@ -22,7 +22,7 @@ TEXELS = 32
 """Texels of the print along a square."""
 REACH, MOST_PIXELS = 0.75, 12
 """Half the width of what is laid over the picture, squares, and its greatest value, pixels."""
-SAMPLES = 3
+SAMPLES = 2
 """Samples of the print along a pixel."""
 BLUR = 0.5
 """Standard deviation of the picture's blur that is assumed, pixels."""
@@ -32,8 +32,13 @@ MIN_LIKENESS = 0.8
 """Least correlation of print and picture around a corner: hands, glare and other boards are below."""
 MAX_MOVE = 0.3
 """Greatest distance of a corner from where the others predict it, squares."""
-MIN_CURVED = 20
-"""Least number of corners for which the map from the picture to the board bends as lenses do (quadratic terms)."""
+BENDS = ((20, 10), (12, 6))
+"""Least numbers of corners for which the map from the picture to the board bends as lenses do, and how many terms it has then."""
+RECENTRED, WELL_CENTRED = 3, 0.5
+"""Times that the window is laid around the corner, and the distance, pixels, within which it is: what is wrong with the slope of the map
+cancels around the middle."""
+FAR = 0.008
+"""Distance of a marker's corner from the markers' homography, over the picture's longer side, from which on it is taken to be misread."""
 MIN_AREA = 20
 """Least number of pixels that are compared."""
 
@@ -63,7 +68,7 @@ def registered(printed: Print, grey: NDArray[np.uint8], points: Array, pixels: A
     corners, picture = printed.board.points[:, :2], grey.astype(np.float32)
     found: dict[int, Array] = {}
     for n in range(ROUNDS):
-        warp = _Warp.of(points, pixels, grey.shape)
+        warp = _Warp.of(points, pixels, FAR * max(grey.shape) if n == 0 else np.inf)
         if warp is None:
             break
         tried = {k: at for k, corner in enumerate(corners) if (at := _laid(printed, picture, warp, corner)) is not None}
@@ -80,25 +85,27 @@ class _Warp(NamedTuple):
     H: Array
     """Pixels to metres, of shape (3, 3)."""
     bend: Array
-    """Of shape (6, 2): coefficients of 1, x, y, x², xy, y² of pixels, normalised."""
+    """Of shape (10, 2): coefficients of the products of x and y up to the third degree, of pixels, normalised."""
     middle: Array
     scale: float
 
     @staticmethod
-    def of(points: Array, pixels: Array, shape: tuple[int, ...]) -> _Warp | None:
-        """The map that fits places on the board (N, 2) and in the picture (N, 2); None if none does."""
+    def of(points: Array, pixels: Array, far: float = np.inf) -> _Warp | None:
+        """The map that fits places on the board (N, 2) and in the picture (N, 2), without those that are `far` off, pixels; None if none
+        does."""
         if len(points) < 4:
             return None
-        H, kept = cv2.findHomography(points, pixels, cv2.RANSAC, max(2.0, 0.004 * max(shape)))
+        H, kept = cv2.findHomography(points, pixels, cv2.RANSAC, far) if np.isfinite(far) else cv2.findHomography(points, pixels)
         if H is None or kept.sum() < 4 or abs(np.linalg.det(H)) < 1e-12:
             return None
         use = kept.ravel() > 0
         middle, scale = pixels[use].mean(0), max(float(np.ptp(pixels[use], axis=0).max()), 1.0)
-        plain = _Warp(np.linalg.inv(H), np.zeros((6, 2)), middle, scale)
-        if use.sum() < MIN_CURVED:
+        plain = _Warp(np.linalg.inv(H), np.zeros((10, 2)), middle, scale)
+        terms = next((terms for least, terms in BENDS if use.sum() >= least), 0)
+        if not terms:
             return plain
-        off = points[use] - plain(pixels[use])
-        return plain._replace(bend=np.linalg.lstsq(_terms((pixels[use] - middle) / scale), off, rcond=1e-6)[0])
+        off, table = points[use] - plain(pixels[use]), _terms((pixels[use] - middle) / scale)[:, :terms]
+        return plain._replace(bend=np.pad(np.linalg.lstsq(table, off, rcond=1e-6)[0], ((0, 10 - terms), (0, 0))))
 
     def __call__(self, pixels: Array) -> Array:
         """Places on the board (..., 2), metres, of pixels (..., 2)."""
@@ -122,7 +129,8 @@ class _Warp(NamedTuple):
 
 def _terms(at: Array) -> Array:
     x, y = at[..., 0], at[..., 1]
-    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
+    xx, yy = x * x, y * y
+    return np.stack([np.ones_like(x), x, y, xx, x * y, yy, xx * x, xx * y, x * yy, yy * y], -1)
 
 
 def _laid(printed: Print, picture: NDArray[np.float32], warp: _Warp, corner: Array) -> Array | None:
@@ -135,19 +143,33 @@ def _laid(printed: Print, picture: NDArray[np.float32], warp: _Warp, corner: Arr
         return None
     if not (np.isfinite(start).all() and np.isfinite(spread).all()) or np.abs(start).max() > 1e5:
         return None
-    reach, centre = np.minimum(np.ceil(spread), MOST_PIXELS).astype(int), np.rint(start).astype(int)
-    low, high = centre - reach, centre + reach + 1
+    reach, at = np.minimum(np.ceil(spread), MOST_PIXELS).astype(int), start
+    for _ in range(RECENTRED):
+        found = _laid_around(printed, picture, warp, corner, (start, at, reach))
+        if found is None or np.linalg.norm(slope @ (found - start)) > MAX_MOVE * printed.board.square:
+            return None
+        moved, at = np.linalg.norm(found - at), found
+        if moved < WELL_CENTRED:
+            break
+    return at
+
+
+def _laid_around(printed: Print, picture: NDArray[np.float32], warp: _Warp, corner: Array, where: tuple[Array, Array, Array]) -> Array | None:
+    """As `_laid`, in a window around a pixel. where: the corner's pixel by the map, the pixel, and half the window's sides."""
+    start, around, reach = where
+    low = np.rint(around).astype(int) - reach
+    high = low + 2 * reach + 1
     if (low < 0).any() or high[0] > picture.shape[1] or high[1] > picture.shape[0]:
         return None
     window = picture[low[1] : high[1], low[0] : high[0]]
     x, y = ((np.arange(-SAMPLES, (high[k] - low[k] + 1) * SAMPLES) + 0.5) / SAMPLES - 0.5 + low[k] for k in (0, 1))
-    board = warp(np.stack(np.meshgrid(x, y), -1))
+    board = warp(np.stack(np.meshgrid(x, y), -1) - (around - start))
     texels = (board + np.array(printed.board.size) / 2) * (TEXELS / printed.board.square) - 0.5
     near = (np.abs(board - corner) < REACH * printed.board.square).all(-1)
     weights = _per_pixel(near.astype(np.float32))[1:-1, 1:-1]
     if weights.sum() < MIN_AREA:
         return None
-    moved, by_pixel = np.zeros(2), slope * (TEXELS / printed.board.square)
+    moved, by_pixel, likeness = np.zeros(2), warp.slope(start) * (TEXELS / printed.board.square), 0.0
     for _ in range(STEPS):
         at = (texels - by_pixel @ moved).astype(np.float32)
         drawn = cv2.remap(printed.texture, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=1)
@@ -158,8 +180,7 @@ def _laid(printed: Print, picture: NDArray[np.float32], warp: _Warp, corner: Arr
         moved = moved + step
         if np.linalg.norm(step) < SMALL_STEP:
             break
-    far = np.linalg.norm(slope @ moved) > MAX_MOVE * printed.board.square
-    return None if far or likeness < MIN_LIKENESS else start + moved
+    return around + moved if likeness >= MIN_LIKENESS else None
 
 
 def _per_pixel(samples: NDArray[np.float32]) -> NDArray[np.float32]:
