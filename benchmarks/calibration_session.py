@@ -75,7 +75,7 @@ class Renderer:
 
     def __init__(self, camera: Camera, board: Board, seed: int, noise: float = 2.0, two_sided: bool = False) -> None:
         """The wall is drawn from the seed; the board's back is grey, or has the pattern as well."""
-        self.camera, self.board, self.noise = camera, board, noise
+        self.camera, self.board = camera, board
         self.rng = np.random.default_rng(seed)
         self.front, self.wall = texture(board), self._wall(camera.size)
         width, height = camera.size
@@ -253,9 +253,9 @@ def main() -> None:
     delays = [*(d / args.rate for d in args.delays), *[0.0] * args.cameras][: args.cameras]
     if not (args.folder / "extrinsics" / f"cam{args.cameras}.mp4").exists():
         make_session(args.folder, board, cameras, args.seconds, args.rate, delays, args.seed)
-    begun = time.perf_counter()
+    begun, busy = time.perf_counter(), time.process_time()
     found = calibrate(open_session(args.folder))
-    took = time.perf_counter() - begun
+    took, busy = time.perf_counter() - begun, time.process_time() - busy
     print("camera  focal, %  principal, px  picture, px  place, mm  direction, deg  within the rig, mm")
     for row in errors(cameras, list(found.cameras)):
         print("  ".join(row))
@@ -270,7 +270,7 @@ def main() -> None:
         print(f"scale {solved.scale:.3f} px, {len(found.placement.views)} views, {found.placement.left_out} left out")
     for sentence in (*found.notes, *found.advice):
         print("-", sentence)
-    print(f"{took:.0f} s")
+    print(f"{took:.0f} s, {busy:.0f} s of processor time")
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -46,7 +47,7 @@ def nudged(camera: Camera, rng: np.random.Generator) -> Camera:
 def film(folder: Path, count: int, size: tuple[int, int], seconds: float) -> None:
     """Make FOLDER/true, a recording with its true calibration and films in step, and FOLDER/lab, the same without."""
     walk = Gesture(motion="walk", seconds=seconds, path="circle", size=1.4)
-    spec = Spec(name="true", body=Mannequin(stature=HEIGHT), motion=(Gesture(motion="stand", seconds=1.5), walk), rate=RATE, training=(),
+    spec = Spec(name="true", body=Mannequin(stature=HEIGHT), motion=(Gesture(motion="stand", seconds=2), walk), rate=RATE, training=(),
                 scene=Scene(empty_seconds=2), ring=Ring(count=count, radius=3.6, fov_deg=62, size=size, distortion=LENS))
     synthesize(spec, folder / "made", np.random.default_rng(5))
     for name in ("true", "lab"):
@@ -60,12 +61,19 @@ def film(folder: Path, count: int, size: tuple[int, int], seconds: float) -> Non
     (folder / "lab" / "calibration.toml").unlink()
 
 
+def command(words: list[str]) -> None:
+    """Run a command; it may end with advice (1), but not with an error."""
+    print("shadowpuppet", *words, flush=True)
+    if (code := run(words)) > 1:
+        sys.exit(code)
+
+
 def joint_errors(folder: Path, recording: str, options: Sequence[str]) -> tuple[float, float]:
     """Track a recording in the folder; mean and root mean square of its joints' errors, mm."""
     target = folder / f"run-{recording}"
     shutil.rmtree(target, ignore_errors=True)
-    run(["track", str(folder / recording), "-o", str(target), "--height", str(HEIGHT), *options])
-    found = measure_run(target, folder / "made" / "joints.csv", Comparison(offset=-LATE / RATE)).measured["errors"]
+    command(["track", str(folder / recording), "-o", str(target), "--height", str(HEIGHT), *options])
+    found = measure_run(target, folder / "made" / "truth.csv", Comparison(offset=-LATE / RATE)).measured["errors"]
     return found["mean_mm"], found["rmse_mm"]
 
 
@@ -78,7 +86,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=6.0, help="of walking; the board is carried for four times as long")
     parser.add_argument("--rate", type=float, default=15.0, help="frames/s of the board's films")
     parser.add_argument("--square", type=float, default=0.11)
-    args = parse(parser, lambda folder: [folder, "--cameras", 3, "--size", 320, 240, "--seconds", 1.5, "--rate", 8, "--square", 0.2])
+    args = parse(parser, lambda folder: [folder, "--cameras", 3, "--size", 320, 240, "--seconds", 2, "--rate", 8, "--square", 0.2])
     folder, size = args.folder, tuple(args.size)
     if not (folder / "lab").exists():
         film(folder, args.cameras, size, args.seconds)
@@ -88,11 +96,11 @@ def main() -> None:
         make_session(folder / "session", board_from("charuco 7x5", args.square), then, 4 * args.seconds, args.rate,
                      [0.0, 2.4 / args.rate, *[0.0] * args.cameras][: args.cameras], 3)
     clock = time.process_time()
-    run(["calibrate", str(folder / "session"), "--to", str(folder / "lab" / "calibration.toml")])
+    command(["calibrate", str(folder / "session"), "-o", str(folder / "lab" / "calibration.toml")])
     print("camera  focal, %  principal, px  picture, px  place, mm  direction, deg  within the rig, mm: as it stood in the session")
     for row in errors(then, list(read_calibration(folder / "lab" / "calibration.toml"))):
         print("  ".join(row))
-    run(["check", str(folder / "lab"), "--fix"])
+    command(["check", str(folder / "lab"), "--fix"])
     print("the same after check --fix, as it stands now")
     for row in errors(true, list(read_calibration(folder / "lab" / "calibration.toml"))):
         print("  ".join(row))

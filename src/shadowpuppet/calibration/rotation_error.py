@@ -21,9 +21,9 @@ OUTLIER_PIXELS = 1.0
 """Scale (pixels) of the soft L1 loss: some tangents belong to a limb that is missing in a silhouette."""
 NUDGE = 1e-4
 """Step of numerical derivatives, rad."""
-SHARED_PIXELS, PUSHED_FACTOR = 0.5, 3.0
-"""Standard deviation of the error that all silhouettes of a camera share on one side, pixels; factor on the standard deviations of a pushed
-tripod's rotation for the same: chosen on made faults, of whose rotations intervals then hold some 90 % (benchmarks/coverage_of_check.py)."""
+SHARED_PIXELS, SHARED_WEIGHT, PUSHED_FACTOR = 0.4, 4.0, 3.0
+"""Standard deviation, pixels, of the error that all silhouettes of a camera share on one side, how many measured ones that counts for, and a
+factor on the standard deviations of a pushed tripod's rotation for the same: chosen on made faults (benchmarks/coverage_of_check.py)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,8 +104,10 @@ def _half_widths(left: Array, slopes: Array) -> Array:
     pixels, and their slopes (F, K, 2, 3).
 
     A "sandwich": the pull of each set differs, as far as silhouettes err by chance; and each side of each other camera may err in all sets
-    alike, as silhouettes and the other cameras' places do.
+    alike, as silhouettes and the other cameras' places do. How far, the means over sets tell, which a rotation alone would leave at 0.
     """
+    from scipy.stats import t
+
     known = np.isfinite(left) & np.isfinite(slopes).all(-1)
     r, J = np.where(known, left, 0.0), np.where(known[..., None], slopes, 0.0)
     weighted = J * (known / np.sqrt(1 + (r / OUTLIER_PIXELS) ** 2))[..., None]
@@ -114,9 +116,13 @@ def _half_widths(left: Array, slopes: Array) -> Array:
     sets = int(known.any((1, 2)).sum())
     if sets < 2 or np.linalg.matrix_rank(H, tol=1e-9 * max(float(np.trace(H)), 1e-12)) < 3:
         return np.full(3, np.inf)
-    spread = pulls.T @ pulls * sets / (sets - 1) + SHARED_PIXELS**2 * shared.T @ shared
+    seen = known.any(0)
+    means = r.sum(0)[seen] / known.sum(0)[seen]
+    freedom = SHARED_WEIGHT + max(len(means) - 3, 0)
+    alike = (SHARED_WEIGHT * SHARED_PIXELS**2 + float(means @ means)) / freedom
+    spread = pulls.T @ pulls * sets / (sets - 1) + alike * shared.T @ shared
     inverse = np.linalg.inv(H)
-    return QUANTILE * np.sqrt(np.diag(inverse @ spread @ inverse))
+    return float(t.ppf(0.95, freedom)) * np.sqrt(np.diag(inverse @ spread @ inverse))
 
 
 def estimate_place_error(cameras: Sequence[Camera], rows: Sequence[Row], n: int) -> RotationError | None:
