@@ -83,9 +83,9 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--cameras", type=int, default=4)
     parser.add_argument("--size", type=int, nargs=2, default=(640, 480))
-    parser.add_argument("--seconds", type=float, default=6.0, help="of walking; the board is carried for four times as long")
+    parser.add_argument("--seconds", type=float, default=6.0, help="of walking; the board is carried for five times as long")
     parser.add_argument("--rate", type=float, default=15.0, help="frames/s of the board's films")
-    parser.add_argument("--square", type=float, default=0.11)
+    parser.add_argument("--square", type=float, default=0.16, help="metres: 16 pixels for pictures 640 wide, as the manual asks for")
     args = parse(parser, lambda folder: [folder, "--cameras", 3, "--size", 320, 240, "--seconds", 2, "--rate", 8, "--square", 0.2])
     folder, size = args.folder, tuple(args.size)
     if not (folder / "lab").exists():
@@ -93,7 +93,7 @@ def main() -> None:
     true = list(read_calibration(folder / "true" / "calibration.toml"))
     then = [*true[:-1], nudged(true[-1], np.random.default_rng(2))]
     if not (folder / "session" / "extrinsics" / f"{true[-1].name}.mp4").exists():
-        make_session(folder / "session", board_from("charuco 7x5", args.square), then, 4 * args.seconds, args.rate,
+        make_session(folder / "session", board_from("charuco 7x5", args.square), then, 5 * args.seconds, args.rate,
                      [0.0, 2.4 / args.rate, *[0.0] * args.cameras][: args.cameras], 3)
     clock = time.process_time()
     command(["calibrate", str(folder / "session"), "-o", str(folder / "lab" / "calibration.toml")])

@@ -21,9 +21,10 @@ OUTLIER_PIXELS = 1.0
 """Scale (pixels) of the soft L1 loss: some tangents belong to a limb that is missing in a silhouette."""
 NUDGE = 1e-4
 """Step of numerical derivatives, rad."""
-SHARED_PIXELS, SHARED_WEIGHT, PUSHED_FACTOR = 0.4, 4.0, 3.0
-"""Standard deviation, pixels, of the error that all silhouettes of a camera share on one side, how many measured ones that counts for, and a
-factor on the standard deviations of a pushed tripod's rotation for the same: chosen on made faults (benchmarks/coverage_of_check.py)."""
+SHARED_PIXELS, SHARED_WEIGHT, HIDDEN, PUSHED_FACTOR = 0.4, 4.0, 4.0, 3.0
+"""Standard deviation, pixels, of the error that all silhouettes of a camera share on one side, and how many measured ones that counts for;
+factor on the squares of those, as half of the others' errors turns the camera along and is not seen; factor on the standard deviations of a
+pushed tripod's rotation. Chosen on made faults (benchmarks/coverage_of_check.py)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +120,7 @@ def _half_widths(left: Array, slopes: Array) -> Array:
     seen = known.any(0)
     means = r.sum(0)[seen] / known.sum(0)[seen]
     freedom = SHARED_WEIGHT + max(len(means) - 3, 0)
-    alike = (SHARED_WEIGHT * SHARED_PIXELS**2 + float(means @ means)) / freedom
+    alike = (SHARED_WEIGHT * SHARED_PIXELS**2 + HIDDEN * float(means @ means)) / freedom
     spread = pulls.T @ pulls * sets / (sets - 1) + alike * shared.T @ shared
     inverse = np.linalg.inv(H)
     return float(t.ppf(0.95, freedom)) * np.sqrt(np.diag(inverse @ spread @ inverse))

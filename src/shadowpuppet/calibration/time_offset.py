@@ -35,10 +35,13 @@ OUTLIER, STEPS = 4.0, 3
 """Differences of two signals over this many robust standard deviations are left out; steps of a shift to fractions of a set."""
 PARTS, FEW_PARTS = 8, 1.33
 """Parts of the film whose pulls on a shift are compared, and the factor on the variance for their small number (Student's t over normal)."""
-APART, APART_WEIGHT = 0.15, 4.0
+APART, APART_WEIGHT = 0.1, 4.0
 """Standard deviation, sets, by which shifts of one recording are assumed to differ beyond their noise, as tangents touch one limb before
 one camera and another before the next; and how many measured differences that counts for. Chosen on made recordings
 (benchmarks/coverage_of_check.py)."""
+LONE_PAIR = 1.5
+"""Sets by which the half-width is widened (in squares) of a film whose offset one pair of cameras alone tells: that pair's tangents may be
+wrong in all of the film, as those of a man who balances, whose arms and trunk sway apart."""
 FAR = 3.0
 """Residuals count up to this many standard deviations: a limb that one silhouette lacks."""
 SOLVER_ROUNDS = 30
@@ -189,8 +192,7 @@ def _difference(signals: Array, shift: int) -> float:
 def _solved(count: int, shifts: Sequence[_Shift]) -> tuple[Array, Array]:
     """Sets (C,) by which each film is late against most others, and the half-widths (C,) of their 90 % intervals; NaN where unknown.
 
-    Robust least squares; shifts differ by their noise and by as much more as they are seen to (a random effect with a prior). With three
-    cameras and more a film counts only if pairs with two others tell its offset: one pair alone may be wrong in all of its film.
+    Robust least squares; shifts differ by their noise and by as much more as they are seen to (a random effect with a prior).
     """
     from scipy.stats import t
 
@@ -218,21 +220,17 @@ def _solved(count: int, shifts: Sequence[_Shift]) -> tuple[Array, Array]:
     middle = 0 if len(films) == 2 else int(np.argsort(found, kind="stable")[(len(films) - 1) // 2])
     variance = np.diag(covariance) + covariance[middle, middle] - 2 * covariance[middle]
     late[films] = found - found[middle]
-    spread[films] = t.ppf(0.95, freedom) * np.sqrt(np.maximum(variance, covariance[middle, middle]))
+    alone = [len({shift.first + shift.second - n for shift in used if n in shift[:2]}) == 1 for n in films]
+    widths = t.ppf(0.95, freedom) * np.sqrt(np.maximum(variance, covariance[middle, middle]))
+    spread[films] = np.hypot(widths, LONE_PAIR * np.array(alone))
     return late, spread
 
 
 def _linked(count: int, shifts: Sequence[_Shift]) -> tuple[list[int], list[_Shift]]:
     """The largest group of films whose offsets can be compared, in order, and the shifts between them."""
-    films, used = set(range(count)), list(shifts)
-    least = 1 if count == 2 else 2
-    while True:
-        others = {n: {shift.first + shift.second - n for shift in used if n in shift[:2]} for n in films}
-        kept = {n for n in films if len(others[n]) >= least}
-        group = max((_reached(n, others) & kept for n in kept), key=len, default=set())
-        if group == films:
-            return sorted(films), used
-        films, used = group, [shift for shift in used if shift.first in group and shift.second in group]
+    others = {n: {shift.first + shift.second - n for shift in shifts if n in shift[:2]} for n in range(count)}
+    group = max((_reached(n, others) for n in range(count) if others[n]), key=len, default=set())
+    return sorted(group), [shift for shift in shifts if shift.first in group]
 
 
 def _reached(film: int, others: Mapping[int, set[int]]) -> set[int]:
