@@ -4,8 +4,9 @@ of people who walk, box and only stand, and counted.
     python benchmarks/coverage_of_check.py [--trials 14] [--recordings FOLDER ...] [--masks] [--markdown docs/calibration.md]
 
 Without recordings, some are made in build/coverage: before four cameras, at 30 frames/s, silhouettes from the films. A trial takes
-120 to 180 sets in a row of one of them, every second picture from an even or an odd frame of each film, so that delays are multiples of half
-a set, and a camera turned about a random axis. `off 0.3°`: all other cameras are turned by that, too, as in a calibration that is old.
+120 to 180 sets in a row of one of them, every second picture from an even or an odd frame of each film, so that delays are multiples
+of half a set, and a camera turned about a random axis. `off 0.3°`: all other cameras are turned by that, too, as in a calibration
+that is old.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ OFF = (0.0, 0.3)
 """Degrees by which all cameras of a calibration are off."""
 MOST_LATE, TURNS = 12, (0.5, 4.0)
 """Greatest delay, frames, and the least and greatest rotation of the camera that was turned, degrees."""
-HEADER = ("| recording | calibration | delays stated | within their 90 % interval | half-width, sets | called late | wrongly | rotations stated | "
-          "within | half-width, ° |\n|---|---|---:|---:|---:|---:|---:|---:|---:|---:|")  # fmt: skip
+HEADER = ("| recording | calibration | delays stated | within their 90 % interval | half-width, sets | called late | wrongly | rotations "
+          "stated | within | half-width, ° |\n|---|---|---:|---:|---:|---:|---:|---:|---:|---:|")
 
 
 class Counts(NamedTuple):
@@ -126,7 +127,8 @@ def row(name: str, off: float, counts: Sequence[Counts]) -> str:
         return f"{100 * np.mean(held):.0f} %" if held else ""
 
     return (f"| {name} | {f'off {off:g}°' if off else 'true'} | {len(delays)} of {asked} | {share(delays)} | "
-            f"{f'{np.median(widths):.2f}' if widths else ''} | {sum(each.late for each in counts)} | {sum(each.wrongly for each in counts)} | "
+            f"{f'{np.median(widths):.2f}' if widths else ''} | {sum(each.late for each in counts)} | "
+            f"{sum(each.wrongly for each in counts)} | "
             f"{len(turns)} | {share(turns)} | {f'{np.median(turn_widths):.2f}' if turn_widths else ''} |")
 
 

@@ -107,7 +107,8 @@ def main() -> None:
     found, best = (joint_errors(folder, name, ["--quiet"]) for name in ("lab", "true"))
     print(f"{time.process_time() - clock:.0f} s of processor time")
     ratio = found[0] / best[0]
-    print(f"joints: mean {found[0]:.1f} mm, rms {found[1]:.1f}; with the true calibration {best[0]:.1f} and {best[1]:.1f}: {ratio:.2f} times")
+    print(f"joints: mean {found[0]:.1f} mm, rms {found[1]:.1f}; with the true calibration {best[0]:.1f} and {best[1]:.1f}: "
+          f"{ratio:.2f} times")
     (folder / "result.json").write_text(json.dumps({"mean": found[0], "true": best[0], "ratio": ratio}) + "\n", encoding="utf-8")
 
 

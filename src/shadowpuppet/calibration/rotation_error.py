@@ -39,8 +39,8 @@ class RotationError:
     after: float
     """Median distance of its tangents from the others', pixels, as calibrated and as rotated."""
     spread: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Half-widths of the 90 % intervals of `right`, `down` and `clockwise`, degrees: from how parts of the film differ, and from errors that
-    all outlines of a camera share."""
+    """Half-widths of the 90 % intervals of `right`, `down` and `clockwise`, degrees: from how parts of the film differ, and from errors
+    that all outlines of a camera share."""
     moved: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Displacement of its centre in the world, metres."""
 

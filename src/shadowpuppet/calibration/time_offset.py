@@ -34,12 +34,13 @@ LEAST_SCORE = 2.0
 OUTLIER, STEPS = 4.0, 3
 """Differences of two signals over this many robust standard deviations are left out; steps of a shift to fractions of a set."""
 PARTS, FEW_PARTS = 8, 1.33
-"""Parts of the film whose pulls on a shift are compared, and the factor on the variance for their small number (Student's t over normal)."""
+"""Parts of the film whose pulls on a shift are compared, and the factor on the variance for their small number (Student's t over
+normal)."""
 APART, APART_WEIGHT = 0.1, 4.0
 """Standard deviation, sets, by which shifts of one recording are assumed to differ beyond their noise, as tangents touch one limb before
 one camera and another before the next; and how many measured differences that counts for. Chosen on made recordings
 (benchmarks/coverage_of_check.py)."""
-LONE_PAIR = 1.5
+LONE_PAIR = 2.0
 """Sets by which the half-width is widened (in squares) of a film whose offset one pair of cameras alone tells: that pair's tangents may be
 wrong in all of the film, as those of a man who balances, whose arms and trunk sway apart."""
 FAR = 3.0

@@ -68,9 +68,8 @@ class BoardDetector:
         assert self._markers is not None
         large = cv2.resize(grey, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC) if zoom > 1 else grey
         quads, ids, _ = self._markers.detectMarkers(large)
-        on_board = self.board.marker_corners
-        held = [(on_board[n], np.asarray(quad, float).reshape(4, 2)) for n, quad in zip(np.ravel(ids).tolist(), quads)
-                if n < len(on_board)] if ids is not None else []
+        on_board, numbers = self.board.marker_corners, [] if ids is None else [int(n) for n in np.asarray(ids, np.int64).ravel()]
+        held = [(on_board[n], np.asarray(quad, float).reshape(4, 2)) for n, quad in zip(numbers, quads) if n < len(on_board)]
         if not held:
             return None
         return np.concatenate([place for place, _ in held]), (np.concatenate([quad for _, quad in held]) + 0.5) / zoom - 0.5

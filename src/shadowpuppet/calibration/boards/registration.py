@@ -100,12 +100,13 @@ class _Warp(NamedTuple):
             return None
         use = kept.ravel() > 0
         middle, scale = pixels[use].mean(0), max(float(np.ptp(pixels[use], axis=0).max()), 1.0)
-        plain = _Warp(np.linalg.inv(H), np.zeros((10, 2)), middle, scale)
+        plain = _Warp(np.asarray(np.linalg.inv(H), float), np.zeros((10, 2)), middle, scale)
         terms = next((terms for least, terms in BENDS if use.sum() >= least), 0)
         if not terms:
             return plain
         off, table = points[use] - plain(pixels[use]), _terms((pixels[use] - middle) / scale)[:, :terms]
-        return plain._replace(bend=np.pad(np.linalg.lstsq(table, off, rcond=1e-6)[0], ((0, 10 - terms), (0, 0))))
+        bend = np.asarray(np.linalg.lstsq(table, off, rcond=1e-6)[0], float)
+        return plain._replace(bend=np.pad(bend, ((0, 10 - terms), (0, 0))))
 
     def __call__(self, pixels: Array) -> Array:
         """Places on the board (..., 2), metres, of pixels (..., 2)."""
@@ -123,7 +124,7 @@ class _Warp(NamedTuple):
         x, y, w = np.linalg.inv(self.H) @ [*point, 1.0]
         at = np.array([x / w, y / w])
         for _ in range(4 if self.bend.any() else 0):
-            at = at + np.linalg.solve(self.slope(at), point - self(at))
+            at = at + np.asarray(np.linalg.solve(self.slope(at), point - self(at)), float)
         return at
 
 
@@ -154,7 +155,8 @@ def _laid(printed: Print, picture: NDArray[np.float32], warp: _Warp, corner: Arr
     return at
 
 
-def _laid_around(printed: Print, picture: NDArray[np.float32], warp: _Warp, corner: Array, where: tuple[Array, Array, Array]) -> Array | None:
+def _laid_around(printed: Print, picture: NDArray[np.float32], warp: _Warp, corner: Array,
+                 where: tuple[Array, Array, Array]) -> Array | None:
     """As `_laid`, in a window around a pixel. where: the corner's pixel by the map, the pixel, and half the window's sides."""
     start, around, reach = where
     low = np.rint(around).astype(int) - reach
@@ -166,14 +168,14 @@ def _laid_around(printed: Print, picture: NDArray[np.float32], warp: _Warp, corn
     board = warp(np.stack(np.meshgrid(x, y), -1) - (around - start))
     texels = (board + np.array(printed.board.size) / 2) * (TEXELS / printed.board.square) - 0.5
     near = (np.abs(board - corner) < REACH * printed.board.square).all(-1)
-    weights = _per_pixel(near.astype(np.float32))[1:-1, 1:-1]
+    weights = _per_pixel(np.asarray(near, np.float32))[1:-1, 1:-1]
     if weights.sum() < MIN_AREA:
         return None
     moved, by_pixel, likeness = np.zeros(2), warp.slope(start) * (TEXELS / printed.board.square), 0.0
     for _ in range(STEPS):
         at = (texels - by_pixel @ moved).astype(np.float32)
         drawn = cv2.remap(printed.texture, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=1)
-        drawn = _per_pixel(cv2.GaussianBlur(drawn, (0, 0), BLUR * SAMPLES))
+        drawn = _per_pixel(np.asarray(cv2.GaussianBlur(drawn, (0, 0), BLUR * SAMPLES), np.float32))
         step, likeness = _step(drawn, window, weights)
         if step is None:
             return None
@@ -186,7 +188,7 @@ def _laid_around(printed: Print, picture: NDArray[np.float32], warp: _Warp, corn
 def _per_pixel(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     """Means (h, w) of the samples (h SAMPLES, w SAMPLES) of each pixel."""
     h, w = samples.shape
-    return np.asarray(cv2.resize(samples, (w // SAMPLES, h // SAMPLES), interpolation=cv2.INTER_AREA))
+    return np.asarray(cv2.resize(samples, (w // SAMPLES, h // SAMPLES), interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _step(drawn: NDArray[np.float32], window: NDArray[np.float32], weights: NDArray[np.float32]) -> tuple[Array | None, float]:
@@ -205,6 +207,6 @@ def _step(drawn: NDArray[np.float32], window: NDArray[np.float32], weights: NDAr
     A = np.stack([gain * plain[0].ravel(), gain * plain[1].ravel(), inner.ravel(), np.ones(inner.size)], -1).astype(float)
     weighted = A * weights.reshape(-1, 1)
     try:
-        return np.linalg.solve(A.T @ weighted, weighted.T @ window.ravel())[:2], both / np.sqrt(own * power)
+        return np.asarray(np.linalg.solve(A.T @ weighted, weighted.T @ window.ravel()), float)[:2], both / float(np.sqrt(own * power))
     except np.linalg.LinAlgError:
         return None, 0.0
