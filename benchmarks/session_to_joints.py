@@ -33,7 +33,8 @@ from shadowpuppet.video import open_frames, write_frames
 HEIGHT, RATE = 1.75, 25.0
 LENS = (-0.11, 0.04, 0.0006, -0.0004)
 NUDGE = (1.0, 0.05)
-"""Degrees and metres by which the last camera was turned and moved after the session."""
+"""Degrees and metres by which the last camera was turned and moved after the session: 5 to 8 pixels of a picture 480 wide. Where a turn
+and a move cancel, `check` finds nothing."""
 LATE = 5
 """Frames by which the second camera's film begins before the others': what happens comes later in it."""
 
@@ -91,7 +92,7 @@ def main() -> None:
     if not (folder / "lab").exists():
         film(folder, args.cameras, size, args.seconds)
     true = list(read_calibration(folder / "true" / "calibration.toml"))
-    then = [*true[:-1], nudged(true[-1], np.random.default_rng(2))]
+    then = [*true[:-1], nudged(true[-1], np.random.default_rng(0))]
     if not (folder / "session" / "extrinsics" / f"{true[-1].name}.mp4").exists():
         make_session(folder / "session", board_from("charuco 7x5", args.square), then, 5 * args.seconds, args.rate,
                      [0.0, 2.4 / args.rate, *[0.0] * args.cameras][: args.cameras], 3)

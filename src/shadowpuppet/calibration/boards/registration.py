@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -93,6 +92,8 @@ class _Warp(NamedTuple):
     def of(points: Array, pixels: Array, far: float = np.inf) -> _Warp | None:
         """The map that fits places on the board (N, 2) and in the picture (N, 2), without those that are `far` off, pixels; None if none
         does."""
+        import cv2
+
         if len(points) < 4:
             return None
         H, kept = cv2.findHomography(points, pixels, cv2.RANSAC, far) if np.isfinite(far) else cv2.findHomography(points, pixels)
@@ -158,6 +159,8 @@ def _laid(printed: Print, picture: NDArray[np.float32], warp: _Warp, corner: Arr
 def _laid_around(printed: Print, picture: NDArray[np.float32], warp: _Warp, corner: Array,
                  where: tuple[Array, Array, Array]) -> Array | None:
     """As `_laid`, in a window around a pixel. where: the corner's pixel by the map, the pixel, and half the window's sides."""
+    import cv2
+
     start, around, reach = where
     low = np.rint(around).astype(int) - reach
     high = low + 2 * reach + 1
@@ -187,6 +190,8 @@ def _laid_around(printed: Print, picture: NDArray[np.float32], warp: _Warp, corn
 
 def _per_pixel(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     """Means (h, w) of the samples (h SAMPLES, w SAMPLES) of each pixel."""
+    import cv2
+
     h, w = samples.shape
     return np.asarray(cv2.resize(samples, (w // SAMPLES, h // SAMPLES), interpolation=cv2.INTER_AREA), np.float32)
 

@@ -138,9 +138,9 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, 
 def check_placed(fit: TangencyFit) -> None:
     """Raise `CalibrationError` if most tangents are far apart in the best fit."""
     if fit.far > MOST_FAR:
-        raise CalibrationError(f"{100 * fit.far:.0f} % of the tangents do not fit wherever the cameras stand, so none is placed: are the films "
-                               "of one moment and in step, is each silhouette the same whole person (`shadowpuppet info`), and are the rough "
-                               "places within half a metre and ten degrees?")
+        raise CalibrationError(f"{100 * fit.far:.0f} % of the tangents do not fit wherever the cameras stand, so none is placed: are the "
+                               "films of one moment and in step, is each silhouette the same whole person (`shadowpuppet info`), and are "
+                               "the rough places within half a metre and ten degrees?")
 
 
 def placed_in_step(cameras: Sequence[Camera], sets: SilhouetteSets, rough_focal: float = 0.0) -> tuple[TangencyFit, list[float]]:
