@@ -1,7 +1,7 @@
 """Whether the intervals that `shadowpuppet check` states hold what is true: delays of films and rotations of cameras are made in recordings
 of people who walk, box and only stand, and counted.
 
-    python benchmarks/coverage_of_check.py [--trials 14] [--recordings FOLDER ...] [--masks] [--markdown docs/calibration.md]
+    python benchmarks/coverage_of_check.py [--trials 7] [--recordings FOLDER ...] [--masks] [--markdown docs/calibration.md]
 
 Without recordings, some are made in build/coverage: before four cameras, at 30 frames/s, silhouettes from the films. A trial takes
 120 to 180 sets in a row of one of them, every second picture from an even or an odd frame of each film, so that delays are multiples
@@ -77,9 +77,10 @@ def made(folder: Path = BUILD, motions: Sequence[str] = tuple(MOTIONS), seconds:
 def trial(rig: Rig, frames: SilhouetteSets, rng: np.random.Generator, off: float) -> Counts:
     """Make faults, check, and count. frames: silhouettes of all frames."""
     C, F = len(rig.cameras), len(frames.rows)
-    late = rng.integers(-MOST_LATE, MOST_LATE + 1, C) * (rng.uniform(size=C) < 0.5)
-    sets = int(min(rng.integers(120, 181), (F - 2 * MOST_LATE) // 2))
-    begin = int(rng.integers(MOST_LATE, max(F - 2 * sets - MOST_LATE, MOST_LATE) + 1))
+    most = min(MOST_LATE, F // 6)
+    late = rng.integers(-most, most + 1, C) * (rng.uniform(size=C) < 0.5)
+    sets = int(min(rng.integers(120, 181), (F - 2 * most) // 2))
+    begin = int(rng.integers(most, max(F - 2 * sets - most, most) + 1))
     rows = [[frames.rows[min(max(begin + 2 * f - late[k], 0), F - 1)][k] for k in range(C)] for f in range(sets)]
     turned = int(rng.integers(C)) if rng.uniform() < 0.7 else None
     angles = [rng.uniform(*TURNS) if n == turned else off for n in range(C)]
@@ -153,7 +154,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--recordings", type=Path, nargs="*", help="folders with a true calibration; made ones without")
     parser.add_argument("--masks", action="store_true", help="the recordings' exact silhouettes in place of those of the films")
-    parser.add_argument("--trials", type=int, default=14, help="for each recording and calibration")
+    parser.add_argument("--trials", type=int, default=7, help="for each recording and calibration")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--markdown", type=Path, help="page for the table, at its place")
     args = smallest.parse(parser, _smallest)

@@ -21,7 +21,7 @@ OUTLIER_PIXELS = 1.0
 """Scale (pixels) of the soft L1 loss: some tangents belong to a limb that is missing in a silhouette."""
 NUDGE = 1e-4
 """Step of numerical derivatives, rad."""
-SHARED_PIXELS, SHARED_WEIGHT, HIDDEN, PUSHED_FACTOR = 0.4, 4.0, 4.0, 3.0
+SHARED_PIXELS, SHARED_WEIGHT, HIDDEN, PUSHED_FACTOR = 0.6, 4.0, 5.0, 3.0
 """Standard deviation, pixels, of the error that all silhouettes of a camera share on one side, and how many measured ones that counts for;
 factor on the squares of those, as half of the others' errors turns the camera along and is not seen; factor on the standard deviations of a
 pushed tripod's rotation. Chosen on made faults (benchmarks/coverage_of_check.py)."""
