@@ -49,6 +49,8 @@ def test_a_film_that_one_pair_alone_tells_is_less_certain():
     np.testing.assert_allclose(late - late[0], LATE, atol=1e-3)
     assert (spread[:3] < 0.5).all()
     assert 2.0 < spread[3] < 2.2
+    late, _ = _solved(4, [_Shift(0, 1, 4.2, 0.01), _Shift(0, 2, 4.0, 0.01), _Shift(1, 2, -0.2, 0.01), _Shift(2, 3, -1.0, 0.01)])
+    np.testing.assert_allclose(late, (-4.0, 0.2, 0.0, -1.0), atol=1e-3)  # not against the fourth, the lower median of all
     late, spread = _solved(2, shifts()[:2])  # two cameras have one pair only
     np.testing.assert_allclose(late, LATE[:2], atol=1e-3)
     assert (spread > 2.0).all()

@@ -218,10 +218,11 @@ def _solved(count: int, shifts: Sequence[_Shift]) -> tuple[Array, Array]:
         apart = (APART_WEIGHT * APART**2 + float(beyond.sum())) / freedom
         weights = 1 / (noise + apart) / (1 + (off / FAR) ** 2 / (noise + apart))
     covariance = np.linalg.pinv(A.T @ (weights[:, None] * A))
-    middle = 0 if len(films) == 2 else int(np.argsort(found, kind="stable")[(len(films) - 1) // 2])
+    alone = [len({shift.first + shift.second - n for shift in used if n in shift[:2]}) == 1 for n in films]
+    judges = [k for k, lone in enumerate(alone) if not lone] or list(range(len(films)))  # what one pair tells moves no other film
+    middle = 0 if len(films) == 2 else sorted(judges, key=lambda k: found[k])[(len(judges) - 1) // 2]
     variance = np.diag(covariance) + covariance[middle, middle] - 2 * covariance[middle]
     late[films] = found - found[middle]
-    alone = [len({shift.first + shift.second - n for shift in used if n in shift[:2]}) == 1 for n in films]
     widths = t.ppf(0.95, freedom) * np.sqrt(np.maximum(variance, covariance[middle, middle]))
     spread[films] = np.hypot(widths, LONE_PAIR * np.array(alone))
     return late, spread
