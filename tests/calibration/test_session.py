@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import replace
+from types import SimpleNamespace
 
 import boards
 import numpy as np
 import pytest
 
+from shadowpuppet.calibration import session as session_module
 from shadowpuppet.calibration.boards.board import board_text
 from shadowpuppet.calibration.session import calibrate, open_session
+from shadowpuppet.calibration.solve.bundle import Bundle, Solved
+from shadowpuppet.calibration.solve.placement import Placement
 from shadowpuppet.cli.app import run
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.io.calibration.calibration_files import read_calibration
@@ -98,3 +102,25 @@ def test_a_board_is_printed(tmp_path, capsys):
     assert "A3" in capsys.readouterr().out
     assert run(["calibrate", "--print-board", str(tmp_path / "b.pdf")]) == 2
     assert run(["calibrate"]) == 2
+
+
+@pytest.mark.parametrize(("late", "read_again"), [(0.1, True), (0.015, False)])
+def test_films_that_begin_apart_are_read_again_in_step(copy, monkeypatch, late, read_again):
+    begins, found = [], iter([late, 0.002])
+
+    def read(films, board, starts, moving, advance):
+        if moving:
+            begins.append(dict(starts))
+        return {name: SimpleNamespace(rate=25.0, size=SIZE, found=[]) for name in films}
+
+    def placed(session, names, cameras, carried, laid):
+        bundle = Bundle(tuple(cameras), np.eye(4)[None], np.array([0.0, next(found)]))
+        return Placement(cameras=tuple(cameras), solved=Solved(bundle, *[np.zeros(0)] * 6), views=(), left_out=0, pairs=(), floor=True), []
+
+    monkeypatch.setattr(session_module, "read_films", read)
+    monkeypatch.setattr(session_module, "_placed", placed)
+    monkeypatch.setattr(session_module, "place_advice", lambda placed, carried: [])
+    session = replace(open_session(copy), starts={"cam1": 0.5})
+    delays = calibrate(session, {camera.name: camera for camera in rig()}).placement.solved.bundle.delays
+    np.testing.assert_allclose(delays, [0.0, late + 0.002 * read_again])
+    assert begins == [{"cam1": 0.5}, *([{"cam1": 0.5, "cam2": late}] if read_again else [])]

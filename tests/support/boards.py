@@ -95,7 +95,7 @@ def moments(cameras: list[Camera], rng: np.random.Generator, count: int = 100, s
 
 def drawn(camera: Camera, T_world_board: Array, board: Board = BOARD, mirrored: bool = False) -> NDArray[np.uint8]:
     """The picture (H, W) of a board as a camera without distortion sees it from its front."""
-    texels = 400.0
+    texels = 800.0  # of which cells of markers have whole numbers
     wide, high = (round((side + 0.06) * texels) for side in board.size)
     print_ = np.full((high, wide), 230, np.uint8)
     for x, y, w, h in rectangles(board):

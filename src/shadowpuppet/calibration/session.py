@@ -33,6 +33,8 @@ DOUBT_FACTOR = 3.0
 """Factor on the bundle's standard deviations: corners of one view err together, which the bundle does not know."""
 MIN_DELAY = 0.15
 """Least delay of a film, frames, that is remarked on, if it is over `DOUBT_FACTOR` times its doubt."""
+MAX_DELAY = 0.5
+"""Delay of a film, frames, over which its pictures are taken anew at the times of the others': corners hardly move straight for longer."""
 MIN_VIEW_ANGLE = np.radians(4.0)
 """Least angle between two cameras as the board sees them; with less, depth is hardly known."""
 
@@ -131,6 +133,14 @@ def calibrate(session: Session, lenses: Mapping[str, Camera] | None = None, say:
         return Calibrated(session=session, cameras=tuple(cameras), lenses=tuple(fits.get(name) for name in names), placement=None,
                           advice=tuple(advice), notes=(*notes, "lenses only: there are no films in extrinsics/ or floor/"))
     placed, more = _placed(session, names, cameras, carried, laid)
+    late = {camera.name: float(delay) for camera, delay in zip(placed.cameras, placed.solved.bundle.delays) if camera.name in carried}
+    if any(abs(seconds) * carried[name].rate > MAX_DELAY for name, seconds in late.items()):
+        say("films of the carried board, in step", len(late))
+        starts = {name: session.starts.get(name, 0.0) + seconds for name, seconds in late.items()}
+        carried = read_films(session.films["extrinsics"], board, starts, True, advance)
+        say("solving", 0)
+        placed, more = _placed(session, names, cameras, carried, laid)
+        placed = later_by(placed, late)
     advice += place_advice(placed, carried)
     return Calibrated(session=session, cameras=placed.cameras, lenses=tuple(fits.get(name) for name in names), placement=placed,
                       advice=tuple(advice), notes=(*notes, *more))
@@ -192,6 +202,13 @@ def _placed(session: Session, names: Sequence[str], cameras: Sequence[Camera], c
         notes.append("no film of the board on the floor: the world's z is up as the pictures have it, its origin is a camera, and the "
                      "height of the floor is unknown; lay the board where the origin is to be, and film it: floor/CAMERA.mp4")
     return placed, notes
+
+
+def later_by(placed: Placement, late: Mapping[str, float]) -> Placement:
+    """The placement from films that were read later by some seconds, with each film's whole delay."""
+    bundle = placed.solved.bundle
+    whole = bundle.delays + [late.get(camera.name, 0.0) for camera in placed.cameras]
+    return replace(placed, solved=placed.solved._replace(bundle=replace(bundle, delays=whole)))
 
 
 def delays_of(placed: Placement, carried: Mapping[str, BoardFilm]) -> dict[str, tuple[float, float]]:

@@ -27,12 +27,13 @@ NEEDED = 4
 class Seeker:
     """Frames of a film, picture or folder by time: `at(time)` is the nearest frame, or None if none is within 1.5 frame intervals.
 
-    Times are those of `open_frames` if they increase; else frames are counted from the start after each step back.
+    Times are those of `open_frames` if they increase; else frames are counted from the start after each step back. `shown` is the time of
+    the frame that `at` returned last, NaN if it was None.
     """
 
     def __init__(self, source: Path, size: Size, rate: float | None = None) -> None:
         """`size`: of the frames; `rate`: frames/s, in place of the film's times. Raises `VideoError` if nothing can be read."""
-        self.source, self.size, self.rate = source, size, rate
+        self.source, self.size, self.rate, self.shown = source, size, rate, np.nan
         if source.is_dir():
             self._roll: _Folder | _Film | _Still = _Folder(source, rate)
         elif source.suffix.lower() in IMAGE_SUFFIXES:
@@ -56,7 +57,7 @@ class Seeker:
         """The frame (H, W, 3), blue green red, at a time, seconds after the first; None if there is none."""
         import cv2
 
-        image = self._roll.at(time)
+        image, self.shown = self._roll.at(time)
         if image is None or image.shape[1::-1] == self.size:
             return image
         how = cv2.INTER_AREA if self.size[0] <= image.shape[1] else cv2.INTER_LINEAR
@@ -69,8 +70,8 @@ class _Still:
     def __init__(self, path: Path) -> None:
         self.image = read_image(path)
 
-    def at(self, time: float) -> Image | None:
-        return self.image
+    def at(self, time: float) -> tuple[Image, float]:
+        return self.image, time
 
     def close(self) -> None:
         """Nothing is open."""
@@ -84,9 +85,10 @@ class _Folder:
         read_image(self.paths[0])
         self.step = float(np.median(np.diff(self.times))) if len(self.times) > 1 else np.inf
 
-    def at(self, time: float) -> Image | None:
+    def at(self, time: float) -> tuple[Image | None, float]:
         n = int(np.abs(self.times - time).argmin())
-        return read_image(self.paths[n]) if abs(self.times[n] - time) <= 1.5 * self.step else None
+        there = abs(self.times[n] - time) <= 1.5 * self.step
+        return (read_image(self.paths[n]), float(self.times[n])) if there else (None, np.nan)
 
     def close(self) -> None:
         """Nothing is open."""
@@ -124,7 +126,7 @@ class _Film:
         self.frames.close()  # pyright: ignore[reportAttributeAccessIssue]
         self.stack.close()
 
-    def at(self, time: float) -> Image | None:
+    def at(self, time: float) -> tuple[Image | None, float]:
         self.wanted = wanted = time * self.scale
         reached = self.waiting or self.held
         back = self.held is not None and wanted < self.held.time - self.step / 4
@@ -133,7 +135,10 @@ class _Film:
         while self.waiting is not None and self.waiting.time <= wanted:
             self._advance()
         near = [frame for frame in (self.held, self.waiting) if frame is not None and abs(frame.time - wanted) <= 1.5 * self.step]
-        return self.convert(min(near, key=lambda frame: abs(frame.time - wanted)).frame) if near else None
+        if not near:
+            return None, np.nan
+        nearest = min(near, key=lambda frame: abs(frame.time - wanted))
+        return self.convert(nearest.frame), nearest.time / self.scale
 
     def _advance(self) -> None:
         """Decode one more frame: `held` is the present frame, `waiting` the next."""

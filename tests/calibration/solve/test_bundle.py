@@ -14,7 +14,7 @@ from shadowpuppet.calibration.solve.normal_equations import reduced, solution
 from shadowpuppet.calibration.solve.placement import place_cameras
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
-from shadowpuppet.geometry import inverse
+from shadowpuppet.geometry import inverse, rigid, rotation_from_vector
 
 
 def lens(fisheye: bool) -> Camera:
@@ -178,3 +178,14 @@ def test_few_views_say_what_to_film():
     views = boards.shown(boards.ring(1)[0], np.random.default_rng(2), 4)
     with pytest.raises(CalibrationError, match=r"found 4 different views of the board .*film it again"):
         solve_lens("cam1", boards.BOARD, views, boards.SIZE)
+
+
+def test_a_board_that_is_never_turned_is_reported():
+    camera, rng = boards.ring(1)[0], np.random.default_rng(3)
+    R, views = rotation_from_vector([0.5, 0.2, 0.0]), []
+    for k in range(40):  # moved about, always tilted alike: parallel planes say one thing
+        at = np.array([rng.uniform(-0.6, 0.6), rng.uniform(-0.3, 0.3), rng.uniform(1.2, 2.4)])
+        view = boards.view_of(replace(camera, T_camera_world=np.eye(4)), rigid(R, at), rng, time=0.3 * k)
+        views += [] if view is None else [view]
+    fit = solve_lens(camera.name, boards.BOARD, views, camera.size)
+    assert any("focal length is known to" in sentence and "in too few poses" in sentence for sentence in lens_advice(fit))

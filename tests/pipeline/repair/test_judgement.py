@@ -85,13 +85,17 @@ def test_the_worst_camera_stands_out():
 
 
 def turn(**angles):
-    return SimpleNamespace(**({"right": 0.0, "down": 0.0, "clockwise": 0.0, "degrees": 3.0, "distance": 0.0} | angles))
+    plain = {"right": 0.0, "down": 0.0, "clockwise": 0.0, "degrees": 3.0, "distance": 0.0, "spread": (0.2, 0.2, 0.2)}
+    return SimpleNamespace(**(plain | angles))
 
 
 def test_directions():
-    assert _directions(turn(right=2.04, down=-1.0, clockwise=0.05)) == "2.0 to the right, 1.0 up, 0.1 clockwise"
-    assert _directions(turn(right=-2.0, down=1.0, clockwise=-3.0)) == "2.0 to the left, 1.0 down, 3.0 counter-clockwise"
-    assert _directions(turn(right=0.04)) == "hardly"
+    assert _directions(turn(right=2.04, down=-1.0, clockwise=0.3)) == "2.0 ± 0.2 to the right, 1.0 ± 0.2 up, 0.3 ± 0.2 clockwise"
+    wide = turn(right=-2.0, down=1.0, clockwise=-3.0, spread=(0.5, 0.4, 3.2))
+    assert _directions(wide) == "2.0 ± 0.5 to the left, 1.0 ± 0.4 down"  # about the axis it may be none
+    assert _directions(turn(right=-2.0, down=1.0, clockwise=-3.0)).endswith("3.0 ± 0.2 counter-clockwise")
+    assert _directions(turn(right=0.1)) == "no direction for certain"
+    assert _directions(turn(right=0.04, spread=(0.0, 0.0, 0.0))) == "no direction for certain"
 
 
 def check(**changes):
@@ -111,11 +115,11 @@ def test_doubts():
     found = doubts_of(check(turns={"b": fix}, agreement=agreement((1.0, 9.0, 1.5, None), doubts=lambda: doubts)))
     assert found == ["camera 'c' disagrees much",
                      "camera 'b' disagrees with the others by 9.0 pixels, they by 1.5 at most; it is as if it had been turned by 3.0 "
-                     "degrees (3.0 to the right) since it was calibrated: turned back, 1.2 pixels would be left; calibrate it again, or "
-                     "leave it out: --camera a,c,d"]  # fmt: skip
+                     "degrees (3.0 ± 0.2 to the right) since it was calibrated: turned back, 1.2 pixels would be left; calibrate it again, "
+                     "or leave it out: --camera a,c,d"]  # fmt: skip
     pushed = RotationFix(turn(right=3.0, distance=0.052), 0.4)
     (sentence,) = doubts_of(check(turns={"b": pushed}, agreement=agreement((1.0, 9.0, 1.5, None))))
-    assert "turned by 3.0 degrees (3.0 to the right) and moved by 5 cm since it was calibrated: put back, 0.4 pixels would be" in sentence
+    assert "turned by 3.0 degrees (3.0 ± 0.2 to the right) and moved by 5 cm since it was calibrated: put back, 0.4 pixels" in sentence
     assert doubts_of(check(agreement=agreement((1.0, 9.0, 1.5, 1.0)))) == [
         "camera 'b' disagrees with the others by 9.0 pixels, they by 1.5 at most; calibrate it again, or leave it out: --camera a,c,d"]
     assert doubts_of(check(agreement=agreement((1.0, 9.0, 1.5, 1.0), doubts=lambda: ["a word"]))) == ["a word"]

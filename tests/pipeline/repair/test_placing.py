@@ -16,7 +16,7 @@ from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import rigid, rotation_from_vector, unit
 from shadowpuppet.io.calibration.calibration_files import read_calibration, write_calibration
 from shadowpuppet.pipeline.options import make_options
-from shadowpuppet.pipeline.repair.placing import _above, _Ends, _floor, place_cameras, write_placed
+from shadowpuppet.pipeline.repair.placing import _above, _Ends, _floor, check_placed, place_cameras, write_placed
 from shadowpuppet.pipeline.rig import open_rig
 
 TALL = 1.73
@@ -169,3 +169,9 @@ def test_a_camera_without_a_place_is_refused(lab):
     unknown: Any = SimpleNamespace(cameras=[replace(camera, oriented=False) for camera in open_rig(lab[0], options).cameras])
     with pytest.raises(CalibrationError, match="camera 'cam1': found only a field of view, expected also where it stands, roughly"):
         place_cameras(unknown, options)
+
+
+def test_cameras_whose_tangents_do_not_fit_are_not_placed(placed):
+    check_placed(replace(placed.fit, far=0.4))
+    with pytest.raises(CalibrationError, match=r"74 % of the tangents do not fit wherever the cameras stand, so none is placed"):
+        check_placed(replace(placed.fit, far=0.74))

@@ -137,6 +137,13 @@ class Board:
         return [(row, column, np.asarray(cv2.aruco.generateImageMarker(self.aruco_dictionary, n, cells)) < 128)
                 for n, (row, column) in enumerate(places)]
 
+    @cached_property
+    def marker_corners(self) -> Array:
+        """The markers' corners in the board's frame, clockwise from the upper left one as seen, of shape (markers, 4, 2), metres."""
+        side = self.marker / 2 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        middles = [((column + 0.5) * self.square, (row + 0.5) * self.square) for row, column, _ in self.marker_bits()]
+        return np.asarray(np.reshape(middles, (-1, 1, 2)) - np.array(self.size) / 2 + side, float)
+
 
 def _check(name: str, value: object, good: bool, expected: str) -> None:
     if not good:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.calibration.boards.board import Board
+from shadowpuppet.calibration.boards.registration import print_of, registered
 from shadowpuppet.geometry import Array
 
 MIN_CORNERS = 8
@@ -16,6 +17,9 @@ MIN_SPREAD = 0.02
 """Least ratio of a view's extent across its longest direction to that along it: corners in a line give no pose."""
 MAX_HOMOGRAPHY_ERROR = 0.25
 """Corners are dropped that lie farther from the plane's homography than this share of a square: markers read wrongly."""
+
+MANY_MARKERS, ENLARGED = 0.8, 2
+"""Share of a board's markers under which they are looked for in the enlarged picture as well, and by how much it is enlarged."""
 
 
 class View(NamedTuple):
@@ -38,12 +42,12 @@ class BoardDetector:
         """Of a board."""
         import cv2
 
-        self.board = board
-        self._charuco = cv2.aruco.CharucoDetector(board.aruco_board) if board.kind == "charuco" else None
+        self.board, self._print = board, print_of(board)
+        self._markers = cv2.aruco.ArucoDetector(board.aruco_dictionary) if board.kind == "charuco" else None
 
     def find(self, grey: NDArray[np.uint8], time: float = 0.0) -> View | None:
         """The view of the board in a picture (H, W); None if it shows fewer than `MIN_CORNERS`."""
-        found = self._charuco_corners(grey) if self._charuco is not None else self._checker_corners(grey)
+        found = self._charuco_corners(grey) if self._markers is not None else self._checker_corners(grey)
         if found is None:
             return None
         ids, pixels = _consistent(self.board, *found)
@@ -52,13 +56,23 @@ class BoardDetector:
         return View(time, ids, pixels, _sharpness(grey, pixels))
 
     def _charuco_corners(self, grey: NDArray[np.uint8]) -> tuple[NDArray[np.int64], Array] | None:
-        assert self._charuco is not None
-        corners, ids, _, _ = self._charuco.detectBoard(grey)
-        if ids is None or len(ids) < MIN_CORNERS:
+        places = self._marker_corners(grey, 1)
+        if places is not None and len(places[0]) < MANY_MARKERS * 4 * self.board.markers:  # markers may be too small for the detector
+            places = self._marker_corners(grey, ENLARGED) or places
+        return None if places is None else registered(self._print, grey, *places)
+
+    def _marker_corners(self, grey: NDArray[np.uint8], zoom: int) -> tuple[Array, Array] | None:
+        """Places of the markers' corners on the board and in the picture, of shape (4 K, 2), as found in the picture enlarged."""
+        import cv2
+
+        assert self._markers is not None
+        large = cv2.resize(grey, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC) if zoom > 1 else grey
+        quads, ids, _ = self._markers.detectMarkers(large)
+        on_board, numbers = self.board.marker_corners, [] if ids is None else [int(n) for n in np.asarray(ids, np.int64).ravel()]
+        held = [(on_board[n], np.asarray(quad, float).reshape(4, 2)) for n, quad in zip(numbers, quads) if n < len(on_board)]
+        if not held:
             return None
-        numbers = np.asarray(ids, np.int64).ravel()
-        order = np.argsort(numbers)
-        return numbers[order], np.asarray(corners, float).reshape(-1, 2)[order]
+        return np.concatenate([place for place, _ in held]), (np.concatenate([quad for _, quad in held]) + 0.5) / zoom - 0.5
 
     def _checker_corners(self, grey: NDArray[np.uint8]) -> tuple[NDArray[np.int64], Array] | None:
         import cv2
@@ -76,7 +90,9 @@ class BoardDetector:
         half = int(np.clip(gap / 3, 2, 11))
         stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 40, 1e-3)
         pixels = np.asarray(cv2.cornerSubPix(grey, np.ascontiguousarray(start), (half, half), (-1, -1), stop), float).reshape(-1, 2)
-        return np.arange(across * down), _in_order(self.board, grey, pixels)
+        ids, pixels = np.arange(across * down), _in_order(self.board, grey, pixels)
+        better = registered(self._print, grey, self.board.points[:, :2], pixels)
+        return better if len(better[0]) >= MIN_CORNERS else (ids, pixels)
 
 
 def _in_order(board: Board, grey: NDArray[np.uint8], pixels: Array) -> Array:

@@ -126,8 +126,12 @@ def _read_film(path: Path, facts: _Facts, board: Board, times: Array, start: flo
         for time in times.tolist():
             picture = film.at(time + start) if time + start >= 0 else None
             view = None if picture is None else detector.find(_grey(picture), time)
-            later = film.at(time + start + 1 / facts.rate) if moving and view is not None else None
-            velocities.append(None if view is None or later is None else _velocity(view, detector.find(_grey(later)), facts.rate))
+            shown = film.shown
+            later = film.at(shown + 1 / facts.rate) if moving and view is not None else None
+            speed = None if view is None or later is None else _velocity(view, detector.find(_grey(later)), facts.rate)
+            if view is not None and speed is not None:  # frames lie beside the wanted times, each film's elsewhere
+                view = view._replace(pixels=view.pixels + speed * (time + start - shown))
+            velocities.append(speed)
             views.append(view)
         tries = [film.at(float(t)) for t in np.linspace(0, times[-1] + start, MIRROR_TRIES)] if not any(views) else []
     _check_not_mirrored(path, board, detector, views, [_grey(picture) for picture in tries if picture is not None])

@@ -59,6 +59,8 @@ class TangencyFit:
     """Standard deviations of the cameras' centres within the rig, of shape (C,), metres: root of the trace."""
     angle_sd: Array
     """The same of their directions, of shape (C,), radians."""
+    turn_sd: Array
+    """The same about each camera's axes, of shape (C, 3), radians."""
     focal_sd: Array
     """The same of their focal lengths, relative, of shape (C,); 0 where they were given."""
     tangents: int
@@ -106,10 +108,11 @@ def place_by_outlines(cameras: Sequence[Camera], rows: Sequence[Row], free: Sequ
         value = _minimised(cameras, hulls, pairs, value, free, scale * size, deviations)
     now = _moved(cameras, value)
     last = [_distances(now, hulls, pair) for pair in pairs]
-    place_sd, angle_sd, focal_sd = _deviations(now, hulls, pairs, last, free, LOSS_SCALES[-1] * size, deviations)
+    sd = _deviations(now, hulls, pairs, last, free, LOSS_SCALES[-1] * size, deviations)
     values = np.concatenate([each[np.isfinite(each)] for each in last])
     return TangencyFit(cameras=tuple(now), before=_medians(len(cameras), pairs, found), after=_medians(len(cameras), pairs, last),
-                       place_sd=place_sd, angle_sd=angle_sd, focal_sd=focal_sd, tangents=len(values),
+                       place_sd=np.linalg.norm(sd[:, MOVE], axis=1), angle_sd=np.linalg.norm(sd[:, TURN], axis=1), turn_sd=sd[:, TURN],
+                       focal_sd=sd[:, FOCAL], tangents=len(values),
                        far=float((np.abs(values) > FAR_PIXELS * size).mean()))
 
 
@@ -267,8 +270,8 @@ def _normal(parts: Iterable[_Linear], size: int, scale: float) -> tuple[Array, A
 
 
 def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], found: Sequence[Array],
-                free: Sequence[int], scale: float, deviations: Array) -> tuple[Array, Array, Array]:
-    """Standard deviations of centres (C,), m, directions (C,), rad, and focal lengths (C,), relative, from how much parts of the film
+                free: Sequence[int], scale: float, deviations: Array) -> Array:
+    """Standard deviations (C, PARAMETERS) of the cameras' increments, rad, m and relative, from how much parts of the film
     would move them (a "sandwich" of gradients by blocks of sets: neighbouring silhouettes err together), and at least from an error
     `OUTLINE_ERROR` of every outline that differs from the others: a person who stands still shows few. If all cameras are free, within the
     rig: not of what a motion or a scale of the whole rig changes."""
@@ -293,8 +296,7 @@ def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Seque
     within = ((inverse(1.0) @ blocks[:, places].T) ** 2).sum(1) * BLOCKS / (BLOCKS - 1)
     own = np.zeros(size)
     own[places] = np.maximum(within, np.diag(inverse(alike)))
-    own = own.reshape(-1, PARAMETERS)
-    return np.sqrt(own[:, MOVE].sum(1)), np.sqrt(own[:, TURN].sum(1)), np.sqrt(own[:, FOCAL])
+    return np.sqrt(own.reshape(-1, PARAMETERS))
 
 
 def _distinct(hulls: Sequence[_Hulls], shift: float) -> int:

@@ -204,7 +204,7 @@ def _rotations(rig: Rig, found: Agreement, rows: Sequence[Row]) -> dict[str, Rot
     for name in found.wrong or _standing_out(found, 1.0):
         n = rig.names.index(name)
         fix, apart = _undone(rig, estimate_rotation_error(rig.cameras, rows, n), rows, n), found.apart[n]
-        if fix is not None and apart is not None and fix.apart < ROTATION_SHARE * apart and fix.apart < found.limit:
+        if fix is not None and apart is not None and fix.apart < min(ROTATION_SHARE * apart, found.limit) and fix.turn.certain:
             fixes[name] = fix
     return fixes
 
@@ -282,7 +282,9 @@ def doubts_of(check: CalibrationCheck) -> list[str]:
 
 
 def _directions(rotation: RotationError) -> str:
+    """Each part of a rotation with its 90 % interval; those that may be none are left out."""
     directions = [(rotation.right, "to the right", "to the left"), (rotation.down, "down", "up"),
                   (rotation.clockwise, "clockwise", "counter-clockwise")]
-    text = [f"{abs(value):.1f} {more if value > 0 else less}" for value, more, less in directions if abs(value) >= 0.05]
-    return ", ".join(text) or "hardly"
+    text = [f"{abs(value):.1f} ± {width:.1f} {more if value > 0 else less}"
+            for (value, more, less), width in zip(directions, rotation.spread) if abs(value) > max(width, 0.05)]
+    return ", ".join(text) or "no direction for certain"

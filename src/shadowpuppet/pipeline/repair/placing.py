@@ -51,6 +51,8 @@ ROUGH_NAME = "rough.toml"
 """Name of a recording's file with rough places (`io.calibration.rough`), which counts before its calibration."""
 MANY_FAR = 0.15
 """Share of tangents that are far apart (`TangencyFit.far`) that is remarked on."""
+MOST_FAR = 0.5
+"""That share from which on cameras are not placed at all: what was found then is no rig."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,6 +124,7 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, 
         sets = gather_silhouettes(there, options, listener, whole=True)
     rows = aligned_sets(sets.rows, [0.0] * len(there.cameras), SETS)
     fit = placed_by_rows(there.cameras, rows, rough_focal) if any(late) else fit
+    check_placed(fit)
     listener.begin("floor and height")
     unknown = rough_focal > 0 and not fit.focal_sd.any()
     placed = grounded(fit, rows, options.height or rig.recording.subject.height)
@@ -130,6 +133,14 @@ def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, 
     changed = any(abs(starts[view.camera.name] - view.start) > SAME_START for view in rig.recording.views)
     placed = replace(placed, advice=(*placed.advice, STATED_FOCAL)) if unknown else placed
     return replace(placed, starts=starts) if changed else placed
+
+
+def check_placed(fit: TangencyFit) -> None:
+    """Raise `CalibrationError` if most tangents are far apart in the best fit."""
+    if fit.far > MOST_FAR:
+        raise CalibrationError(f"{100 * fit.far:.0f} % of the tangents do not fit wherever the cameras stand, so none is placed: are the "
+                               "films of one moment and in step, is each silhouette the same whole person (`shadowpuppet info`), and are "
+                               "the rough places within half a metre and ten degrees?")
 
 
 def placed_in_step(cameras: Sequence[Camera], sets: SilhouetteSets, rough_focal: float = 0.0) -> tuple[TangencyFit, list[float]]:
