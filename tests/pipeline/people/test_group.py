@@ -10,6 +10,7 @@ import pytest
 from shadowpuppet.body.models import average_sizes
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.io.files.nested import read_nested, write_nested
+from shadowpuppet.pipeline.people import fronts, later_sizes
 from shadowpuppet.pipeline.people import group as module
 from shadowpuppet.pipeline.people.group import GONE_SECONDS, Group, first_people
 from shadowpuppet.pipeline.people.kept import TYPES, kept, restore
@@ -57,14 +58,17 @@ def scene(monkeypatch):
         state = next(each.state for each in given if isinstance(each, Share))
         return SimpleNamespace(place=state.place, pose=state.pose, status="tracked", overlap=state.overlap - now.lead, is_other=True)
 
-    monkeypatch.setattr(module, "turn_round", other)
+    monkeypatch.setattr(fronts, "turn_round", other)
+    monkeypatch.setattr(fronts, "follow_turned", other)
     monkeypatch.setattr(module, "follow_turned", other)
+    monkeypatch.setattr(module, "touching", lambda drawn, within: list(drawn))  # so that no tracker with fewer particles is made
+    monkeypatch.setattr(later_sizes, "shows", lambda share: False)
     monkeypatch.setattr(module, "find_people", lambda floor, masks, explained=(): list(now.figures))
     monkeypatch.setattr(module, "explained", lambda drawn, number: [])
     monkeypatch.setattr(module, "place_of", lambda body, state: state.place)
     monkeypatch.setattr(module, "step", step)
     monkeypatch.setattr(module, "start", start)
-    monkeypatch.setattr(module, "step_of", lambda body, pose, time: Step(time, pose[:2], now.facing))
+    monkeypatch.setattr(fronts, "step_of", lambda body, pose, time: Step(time, pose[:2], now.facing))
     now.group = Group(None, None, fit, np.random.default_rng(0))
     now.time = 0.0
 
@@ -143,7 +147,7 @@ def test_who_is_carried_backwards_is_turned_round_if_that_fits(scene, monkeypatc
             scene.facing = -scene.facing
         return SimpleNamespace(**vars(share.state) | {"overlap": 0.78 if fits else 0.7})
 
-    monkeypatch.setattr(module, "turn_round", turn)
+    monkeypatch.setattr(fronts, "turn_round", turn)
     scene.run(1.0, figure(0))
     for n in range(20):
         scene.run(STEP, figure(0.1 * n))

@@ -1,0 +1,85 @@
+"""Sizes of a person whom no view shows apart from others: solved on the person's share of the evidence of several frames, together with
+the poses, for both ways in which the person may face.
+
+With average sizes a body and the same body turned round fit too alike. Each with the sizes that suit it does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.sizes import BoneSizes
+from shadowpuppet.camera.rasterize import count
+from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
+from shadowpuppet.tracking.multiview.size_estimation import INDEPENDENT_POINTS, POINT_STRIDE, SIZE_PULL, size_deviations
+from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.particle_filter import Particles
+from shadowpuppet.tracking.people.tracker import Share, observed
+
+ROUNDS, CYCLES = 2, 4
+"""Number of rounds, each of which solves for the sizes and then fits the poses again; cycles of the tracker in which it does."""
+SHOWN, VIEWS = 0.6, 2
+"""Least share of the drawn body that a view must show apart from other people, and the number of such views in a frame, to measure in it."""
+
+
+class Measure(NamedTuple):
+    """A person measured, facing one way."""
+
+    tracker: MultiviewTracker
+    """With the body of the sizes."""
+    sizes: BoneSizes
+    poses: Array
+    """In the frames, (F, D)."""
+    overlaps: Array
+    """Of the drawn poses with the silhouettes in the frames, (F,)."""
+    residual: float
+    """Root mean square distance of the surface points from the body, metres."""
+
+
+def shows(share: Share) -> bool:
+    """Whether a frame shows enough of a person apart from others to measure them in it."""
+    if share.state.status not in ("tracked", "uncertain") or len(share.points.points) < 100:
+        return False
+    views = 0
+    for body, ignored in zip(share.drawn.masks, share.ignored):
+        if ignored is not None and body.any():
+            views += int(np.count_nonzero(body & ~ignored) >= SHOWN * np.count_nonzero(body))
+    return views >= VIEWS
+
+
+def measure(rng: np.random.Generator, make: Callable[[BoneSizes], Body], expected: BoneSizes, tracker: MultiviewTracker,
+            shares: Sequence[Share], poses: Array) -> Measure:
+    """Sizes that suit a person's shares of F frames, from poses (F, D) of a body of the `expected` sizes; `tracker`: of any body."""
+    spread, sizes, residual = size_deviations(expected, shown=False), expected, np.nan
+    settings = tracker.settings
+    tracker = replace(tracker, body=make(sizes), looks=0)
+    for _ in range(ROUNDS):
+        clouds = [observed(tracker, share).cloud(POINT_STRIDE) for share in shares]
+        pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
+        centre, pull = map(np.array, zip(*pulls, strict=True))
+        bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
+                              worth=INDEPENDENT_POINTS[settings.body])
+        sizes, residual, tracker = bundle.sizes, bundle.residual, replace(tracker, body=make(bundle.sizes))
+        states = [_fitted(rng, tracker, share, pose) for share, pose in zip(shares, bundle.poses)]
+        poses = np.array([state.pose for state in states])
+    return Measure(tracker, sizes, poses, np.array([state.overlap for state in states]), residual)
+
+
+def _fitted(rng: np.random.Generator, tracker: MultiviewTracker, share: Share, pose: Array) -> MultiviewState:
+    """The state of a pose (D,) fitted again to a share."""
+    observation, state = observed(tracker, share), at_pose(tracker, share.state, pose)
+    for _ in range(CYCLES):
+        state = tracker.cycle(rng, state, observation)
+    return state
+
+
+def at_pose(tracker: MultiviewTracker, state: MultiviewState, pose: Array) -> MultiviewState:
+    """A state at rest in a pose (D,)."""
+    particles = Particles(np.repeat(pose[None], tracker.number, 0), *np.zeros((2, tracker.number)))
+    return state._replace(pose=pose, velocity=np.zeros_like(pose), particles=particles)
