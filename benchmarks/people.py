@@ -51,8 +51,8 @@ class Film:
     people: int
     cameras: int
     seed: int
-    seconds: float = 2.4
-    size: str = "320x240"
+    seconds: float = 2.0
+    size: str = "256x192"
     rate: float = 15.0
 
     @property

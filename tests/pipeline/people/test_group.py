@@ -30,7 +30,7 @@ def figure(x: float, height: float = 1.7) -> Figure:
 @pytest.fixture
 def scene(monkeypatch):
     """A group whose trackers follow people to their figure, and are lost where there is none; `figures` are those seen now."""
-    now = SimpleNamespace(figures=[], fits=0, refuse=False, facing=np.array([1.0, 0.0]), sided=True, measured=True, lead=0.0,
+    now = SimpleNamespace(figures=[], fits=0, refuse=False, facing=np.array([1.0, 0.0]), sided=True, measured=True, lead=0.0, side=True,
                           images=())
 
     def fit(rng, sets):
@@ -62,6 +62,7 @@ def scene(monkeypatch):
     monkeypatch.setattr(fronts, "follow_turned", other)
     monkeypatch.setattr(module, "follow_turned", other)
     monkeypatch.setattr(module, "touching", lambda drawn, within: list(drawn))  # so that no tracker with fewer particles is made
+    monkeypatch.setattr(fronts, "shows_side", lambda tracker, share: now.side)
     monkeypatch.setattr(later_sizes, "shows", lambda share: False)
     monkeypatch.setattr(module, "find_people", lambda floor, masks, explained=(): list(now.figures))
     monkeypatch.setattr(module, "explained", lambda drawn, number: [])
@@ -166,9 +167,10 @@ def test_where_a_person_faces_is_known_from_silhouettes_or_when_they_walk(scene,
     assert member.facing.is_known
 
 
-@pytest.mark.parametrize(("lead", "known", "turned"), [(0.05, True, False), (-0.05, True, True), (0.01, False, False)])
-def test_who_stands_is_followed_both_ways_until_one_is_better(scene, lead, known, turned):
-    scene.sided, scene.lead = False, lead
+@pytest.mark.parametrize(("lead", "side", "known", "turned"), [
+    (0.05, True, True, False), (-0.05, True, True, True), (0.01, True, False, False), (0.05, False, False, False)])
+def test_who_stands_is_followed_both_ways_until_one_is_better_from_the_side(scene, lead, side, known, turned):
+    scene.sided, scene.lead, scene.side = False, lead, side
     scene.run(1.0, figure(0))
     (member,) = scene.group.members
     assert member.trial is not None

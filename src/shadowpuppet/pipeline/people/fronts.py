@@ -7,7 +7,7 @@ import numpy as np
 from shadowpuppet.pipeline.people.member import Member
 from shadowpuppet.tracking.multiview.tracker import MultiviewState
 from shadowpuppet.tracking.people.facing import CLEARLY, LONGEST_TRIAL, Trial
-from shadowpuppet.tracking.people.tracker import Share, follow_turned, turn_round
+from shadowpuppet.tracking.people.tracker import Share, follow_turned, shows_side, turn_round
 from shadowpuppet.tracking.people.walking import ALONG, step_of
 
 TURN_LOSS = 0.05
@@ -59,7 +59,7 @@ def _try_both_ways(member: Member, share: Share, time: float) -> None:
     elif trial is None or time - trial.begun > LONGEST_TRIAL:
         member.trial = Trial(time, turn_round(tracker, member.rng, share))
     else:
-        trial.add(time, follow_turned(tracker, member.rng, trial.state, share), share.state.overlap)
+        trial.add(time, follow_turned(tracker, member.rng, trial.state, share), share.state.overlap, shows_side(tracker, share))
         if not member.subject.is_measured:  # with average sizes both ways fit too alike: the sizes that suit each decide
             return
         if (right := trial.is_right(time)) is not None:

@@ -16,11 +16,11 @@ from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.tracking.people.evidence import draw_person
 from shadowpuppet.tracking.people.facing import SETTLING
 from shadowpuppet.tracking.people.shared_sizes import Measure, at_pose, measure, shows
-from shadowpuppet.tracking.people.tracker import follow_turned
+from shadowpuppet.tracking.people.tracker import follow_turned, shows_side
 
 SETS, SECONDS = 8, 1.4
 """Number of frames in which a person is measured, and the least time from the first to the last of them."""
-LEAD = 0.01
+LEAD = 0.02
 """Least difference of the mean overlaps of the person measured facing one way and the other that tells the front."""
 
 
@@ -31,7 +31,7 @@ def measure_later(member: Member, time: float) -> None:
     known = member.facing.is_known
     if not known and (member.trial is None or time - member.trial.begun < SETTLING):
         return
-    if not shows(member.share):
+    if not shows(member.share) or not (known or shows_side(member.subject.tracker, member.share)):
         return
     turned = None if known or member.trial is None else member.trial.state.pose
     share = member.share._replace(masks=tuple(member.share.masks), ignored=tuple(member.share.ignored))

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.body.sizes import BoneSizes
+from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
@@ -25,11 +26,13 @@ from shadowpuppet.tracking.people.evidence import Drawn, draw_person
 from shadowpuppet.tracking.people.facing import refitted
 from shadowpuppet.tracking.people.shared_sizes import at_pose
 from shadowpuppet.tracking.people.tracker import Person, Share, keep_front, observed, step
+from shadowpuppet.tracking.people.walking import TURN
 
 LONGEST = 10.0
 """Time (s) over which people are followed backwards at most."""
-AS_WELL = 0.02
-"""Overlap by which frames followed backwards may fit worse than as they were."""
+AS_WELL, TURNED = 0.02, 0.1
+"""Overlap by which frames followed backwards may fit worse than as they were; by which they may where these face another way: the front is
+known at the end, from which people are followed."""
 AGREE = 0.12
 """Greatest mean distance (m) of the joints of a frame followed backwards from those that there were, if both are to be right."""
 MOST_LOST = 5
@@ -191,7 +194,9 @@ def _lead(member: Member, share: Share, motion: Motion, time: float) -> float:
         return AS_WELL
     observation = observed(member.subject.tracker, share)
     mine, theirs = (float(np.nan_to_num(observation.overlap(pose))) for pose in (share.state.pose, motion.poses[at]))
-    return mine - theirs + AS_WELL
+    heading = member.subject.body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
+    turned = np.cos(share.state.pose[heading] - motion.poses[at, heading]) < np.cos(TURN)
+    return mine - theirs + (TURNED if turned else AS_WELL)
 
 
 def _with(motion: Motion, frames: Sequence[MotionFrame]) -> Motion:

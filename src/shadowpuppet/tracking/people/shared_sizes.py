@@ -14,18 +14,19 @@ import numpy as np
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes
-from shadowpuppet.camera.rasterize import count
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
 from shadowpuppet.tracking.multiview.size_estimation import INDEPENDENT_POINTS, POINT_STRIDE, SIZE_PULL, size_deviations
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles
-from shadowpuppet.tracking.people.tracker import Share, observed
+from shadowpuppet.tracking.people.tracker import Share, observed, views_apart
 
 ROUNDS, CYCLES = 2, 4
 """Number of rounds, each of which solves for the sizes and then fits the poses again; cycles of the tracker in which it does."""
-SHOWN, VIEWS = 0.6, 2
-"""Least share of the drawn body that a view must show apart from other people, and the number of such views in a frame, to measure in it."""
+LEAST_POINTS = 100
+"""Least number of surface points of a person in such a frame."""
+VIEWS = 3
+"""Least number of views that must show most of a person apart from others for a frame to measure them in."""
 
 
 class Measure(NamedTuple):
@@ -44,13 +45,8 @@ class Measure(NamedTuple):
 
 def shows(share: Share) -> bool:
     """Whether a frame shows enough of a person apart from others to measure them in it."""
-    if share.state.status not in ("tracked", "uncertain") or len(share.points.points) < 100:
-        return False
-    views = 0
-    for body, ignored in zip(share.drawn.masks, share.ignored):
-        if ignored is not None and body.any():
-            views += int(np.count_nonzero(body & ~ignored) >= SHOWN * np.count_nonzero(body))
-    return views >= VIEWS
+    enough = share.state.status in ("tracked", "uncertain") and len(share.points.points) >= LEAST_POINTS
+    return enough and len(views_apart(share)) >= VIEWS
 
 
 def measure(rng: np.random.Generator, make: Callable[[BoneSizes], Body], expected: BoneSizes, tracker: MultiviewTracker,

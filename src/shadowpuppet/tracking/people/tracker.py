@@ -37,6 +37,9 @@ TOUCHING = 0.25
 """Distance of two people's bodies below which they are estimated twice in a frame: the second time on evidence divided by the first."""
 SIDED = 0.01
 """Least difference in overlap between a body and the same turned round that tells the front from the back."""
+SHOWN, SIDE = 0.6, np.radians(45)
+"""Least share of the drawn body that a view shows apart from other people; least angle (rad) from the front or the back of a view from the
+side."""
 ROUND_FIGURE = 0.6
 """Distance (m) from a figure up to which surface points are searched for its person."""
 
@@ -119,7 +122,8 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
     found = person.search(rng, observation)  # beside others front and back hardly differ: both are tried
     other = _facing_the_other_way(person, rng, found, observation)
     best = max(found, other, key=lambda state: np.nan_to_num(state.overlap))
-    return Begun(_judged(best), bool(abs(found.overlap - other.overlap) >= SIDED))
+    share = Share(best, own, list(masks), draw_person(person, best.pose), observation.left_out)
+    return Begun(_judged(best), bool(abs(found.overlap - other.overlap) >= SIDED) and shows_side(person, share))
 
 
 def turn_round(person: MultiviewTracker, rng: np.random.Generator, share: Share) -> MultiviewState:
@@ -130,6 +134,19 @@ def turn_round(person: MultiviewTracker, rng: np.random.Generator, share: Share)
 def follow_turned(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState, share: Share) -> MultiviewState:
     """The state after one of the body turned round, from the evidence of a share."""
     return _judged(person.cycle(rng, state, observed(person, share)))
+
+
+def views_apart(share: Share) -> list[int]:
+    """Indices of the cameras that show most of a person's body where no other person's is."""
+    return [n for n, (body, ignored) in enumerate(zip(share.drawn.masks, share.ignored))
+            if ignored is not None and body.any() and np.count_nonzero(body & ~ignored) >= SHOWN * np.count_nonzero(body)]  # fmt: skip
+
+
+def shows_side(person: MultiviewTracker, share: Share) -> bool:
+    """Whether a camera shows a person from the side, apart from others: outlines of people seen from before and behind do not differ."""
+    x, y, _, heading = share.state.pose[person.body.skeleton.dof_indices(GLOBAL_DOFS)].tolist()
+    ways = [person.cameras[n].centre[:2] - (x, y) for n in views_apart(share)]
+    return any(abs(way @ (np.cos(heading), np.sin(heading))) < np.cos(SIDE) * np.linalg.norm(way) for way in ways)
 
 
 def keep_front(person: MultiviewTracker, rng: np.random.Generator, before: MultiviewState, share: Share) -> Share:
