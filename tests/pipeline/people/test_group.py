@@ -197,6 +197,18 @@ def test_a_sudden_turn_raises_doubt_until_it_is_tried(scene):
     assert len(member.facing.parts) == 2
 
 
+@pytest.mark.parametrize(("lead", "kept"), [(0.01, True), (0.03, False)])
+def test_a_sudden_turn_is_undone_if_the_body_turned_back_fits_as_well(scene, lead, kept):
+    scene.run(2.0, figure(0))
+    (member,) = scene.group.members
+    scene.facing, scene.lead = -scene.facing, lead
+    scene.run(STEP, figure(0))
+    assert hasattr(member.state, "is_other") == kept
+    assert member.share.state is member.state
+    assert member.facing.is_known == kept
+    assert len(member.facing.parts) == 2 - kept
+
+
 def dressed(bin: int):
     found = nothing(1)
     found[..., bin] = 50
