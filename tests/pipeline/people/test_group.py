@@ -173,7 +173,7 @@ def test_who_stands_is_followed_both_ways_until_one_is_better_from_the_side(scen
     scene.sided, scene.lead, scene.side = False, lead, side
     scene.run(1.0, figure(0))
     (member,) = scene.group.members
-    assert member.trial is not None
+    assert (member.trial is not None) == side
     states = []
     for _ in range(20):
         scene.run(STEP, figure(0))

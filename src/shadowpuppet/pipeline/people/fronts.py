@@ -56,10 +56,12 @@ def _try_both_ways(member: Member, share: Share, time: float) -> None:
     tracker, trial = member.subject.tracker, member.trial
     if member.facing.is_known:
         member.trial = None
-    elif trial is None or time - trial.begun > LONGEST_TRIAL:
-        member.trial = Trial(time, turn_round(tracker, member.rng, share))
+        return
+    side = shows_side(tracker, share)
+    if trial is None or time - trial.begun > LONGEST_TRIAL:
+        member.trial = Trial(time, turn_round(tracker, member.rng, share)) if side else None  # no view that tells: nothing to follow
     else:
-        trial.add(time, follow_turned(tracker, member.rng, trial.state, share), share.state.overlap, shows_side(tracker, share))
+        trial.add(time, follow_turned(tracker, member.rng, trial.state, share), share.state.overlap, side)
         if not member.subject.is_measured:  # with average sizes both ways fit too alike: the sizes that suit each decide
             return
         if (right := trial.is_right(time)) is not None:
