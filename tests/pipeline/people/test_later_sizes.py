@@ -11,6 +11,7 @@ import pytest
 
 from shadowpuppet.io.person import Person
 from shadowpuppet.pipeline.people import later_sizes
+from shadowpuppet.pipeline.people import member as people_member
 from shadowpuppet.pipeline.people.later_sizes import SETS, measure_later
 from shadowpuppet.pipeline.people.member import SETTLED, Member
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
@@ -110,8 +111,12 @@ def test_an_unknown_front_is_not_measured_from_before_and_behind(seen):
 @pytest.mark.parametrize(("apart", "status", "known", "measured", "few"), [
     (True, "tracked", True, True, True), (False, "tracked", True, True, False), (True, "uncertain", True, True, False),
     (True, "tracked", False, True, False), (True, "tracked", True, False, False)])
-def test_fewer_particles_where_nothing_is_in_doubt(apart, status, known, measured, few):
+def test_fewer_particles_where_nothing_is_in_doubt(monkeypatch, apart, status, known, measured, few):
     one = member(measured)
+    monkeypatch.setattr(people_member, "is_shown", lambda share: False)
+    one.settle(apart)
+    assert one.person.tracker.number == 40
+    monkeypatch.setattr(people_member, "is_shown", lambda share: True)
     one.state, one.facing.is_known = one.state._replace(status=status), known
     one.settle(apart)
     assert one.person.tracker.number == (SETTLED if few else 40)

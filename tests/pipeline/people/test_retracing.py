@@ -33,9 +33,9 @@ def motion(sizes=TALL, heading: float = 0.0, absent: tuple[int, ...] = ()) -> Mo
     return built.build()
 
 
-def group(*parts: Part, measured_at: float = -np.inf, exchanges=()):
+def group(*parts: Part, measured_at: float = -np.inf, exchanges=(), doubted=()):
     subject = SimpleNamespace(body=BODY, person=SimpleNamespace(sizes=TALL), tracker=SimpleNamespace(body=BODY, number=4))
-    member = SimpleNamespace(number=1, facing=SimpleNamespace(parts=list(parts)), measured_at=measured_at, subject=subject, rng=None, share=None,
+    member = SimpleNamespace(number=1, facing=SimpleNamespace(parts=list(parts), doubted=dict.fromkeys(doubted)), measured_at=measured_at, subject=subject, rng=None, share=None,
                              observation=None)  # fmt: skip
     return SimpleNamespace(members=[member], exchanges=list(exchanges), hull=SimpleNamespace(points=lambda masks: None))
 
@@ -49,6 +49,12 @@ def group(*parts: Part, measured_at: float = -np.inf, exchanges=()):
 def test_what_became_known_later_is_followed_back(parts, measured_at, expected):
     found = stretches(group(*parts, measured_at=measured_at), {1: motion()})
     assert found == [Stretch(1, *each) for each in expected]
+
+
+def test_through_parts_whose_front_stayed_unknown():
+    parts = Part(0.0), Part(0.3), Part(0.6, 0.8)
+    assert stretches(group(*parts, doubted=TIMES[2:8].tolist()), {1: motion()}) == [Stretch(1, 0.2, 0.8)]
+    assert stretches(group(*parts, doubted=[*TIMES[:4].tolist(), *TIMES[6:8].tolist()]), {1: motion()}) == [Stretch(1, 0.6, 0.8)]
 
 
 def test_not_through_an_exchange():

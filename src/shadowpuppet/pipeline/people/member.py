@@ -15,7 +15,7 @@ from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTra
 from shadowpuppet.tracking.people.appearance import Colours
 from shadowpuppet.tracking.people.facing import Facing, Trial
 from shadowpuppet.tracking.people.figures import Figure
-from shadowpuppet.tracking.people.tracker import Person, Share
+from shadowpuppet.tracking.people.tracker import Person, Share, is_shown
 from shadowpuppet.tracking.people.walking import Walk
 
 SETTLED = 16
@@ -86,8 +86,8 @@ class Member:
 
     def settle(self, apart: bool) -> None:
         """See whether fewer particles suffice in the next frame; `apart`: no other person is near."""
-        tracked = self.state is not None and self.state.status == "tracked"
-        self.is_settled = apart and tracked and self.subject.is_measured and self.facing.is_known
+        tracked = self.state is not None and self.state.status == "tracked" and self.subject.is_measured and self.facing.is_known
+        self.is_settled = apart and tracked and self.share is not None and is_shown(self.share)
 
     @property
     def person(self) -> Person:

@@ -80,7 +80,8 @@ def stretches(group: Group, motions: Mapping[int, Motion]) -> list[Stretch]:
         if member.number not in motions or not len(motions[member.number]):
             continue
         begin = float(motions[member.number].times[0])
-        open_ = [(part.begin, part.until) for part in member.facing.parts if np.isfinite(part.until)]
+        open_ = [(min(part.begin, _doubted_since(member, motions[member.number], part.until)), part.until)
+                 for part in member.facing.parts if np.isfinite(part.until)]  # fmt: skip
         if np.isfinite(member.measured_at):
             open_.append((begin, member.measured_at))
         for start, end in _joined(open_):
@@ -89,6 +90,15 @@ def stretches(group: Group, motions: Mapping[int, Motion]) -> list[Stretch]:
             if not exchanged and end > start:
                 found.append(Stretch(member.number, start, end))
     return sorted(found, key=lambda each: (each.until, each.number))
+
+
+def _doubted_since(member: Member, motion: Motion, until: float) -> float:
+    """Time (s) from which on the front was unknown in all frames before a time (s): where a body was lost, and found again, a new part of
+    unknown front begins."""
+    at = int(np.searchsorted(motion.times, until - 1e-6))
+    while at and float(motion.times[at - 1]) in member.facing.doubted:
+        at -= 1
+    return float(motion.times[min(at, len(motion) - 1)])
 
 
 def _joined(intervals: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -19,14 +19,12 @@ from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
 from shadowpuppet.tracking.multiview.size_estimation import INDEPENDENT_POINTS, POINT_STRIDE, SIZE_PULL, size_deviations
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles
-from shadowpuppet.tracking.people.tracker import Share, observed, views_apart
+from shadowpuppet.tracking.people.tracker import Share, is_shown, observed
 
 ROUNDS, CYCLES = 2, 4
 """Number of rounds, each of which solves for the sizes and then fits the poses again; cycles of the tracker in which it does."""
 LEAST_POINTS = 100
 """Least number of surface points of a person in such a frame."""
-VIEWS = 3
-"""Least number of views that must show most of a person apart from others for a frame to measure them in."""
 
 
 class Measure(NamedTuple):
@@ -46,7 +44,7 @@ class Measure(NamedTuple):
 def shows(share: Share) -> bool:
     """Whether a frame shows enough of a person apart from others to measure them in it."""
     enough = share.state.status in ("tracked", "uncertain") and len(share.points.points) >= LEAST_POINTS
-    return enough and len(views_apart(share)) >= VIEWS
+    return enough and is_shown(share)
 
 
 def measure(rng: np.random.Generator, make: Callable[[BoneSizes], Body], expected: BoneSizes, tracker: MultiviewTracker,

@@ -37,6 +37,8 @@ TOUCHING = 0.25
 """Distance of two people's bodies below which they are estimated twice in a frame: the second time on evidence divided by the first."""
 SIDED = 0.01
 """Least difference in overlap between a body and the same turned round that tells the front from the back."""
+VIEWS = 3
+"""Number of views that must show most of a person for few particles to suffice, and for sizes to be measured."""
 SHOWN, SIDE = 0.6, np.radians(45)
 """Least share of the drawn body that a view shows apart from other people; least angle (rad) from the front or the back of a view from the
 side."""
@@ -140,6 +142,11 @@ def views_apart(share: Share) -> list[int]:
     """Indices of the cameras that show most of a person's body where no other person's is."""
     return [n for n, (body, ignored) in enumerate(zip(share.drawn.masks, share.ignored))
             if ignored is not None and body.any() and np.count_nonzero(body & ~ignored) >= SHOWN * np.count_nonzero(body)]  # fmt: skip
+
+
+def is_shown(share: Share) -> bool:
+    """Whether enough views show most of a person apart from others: three, or all of fewer cameras."""
+    return len(views_apart(share)) >= min(VIEWS, len(share.drawn.masks))
 
 
 def shows_side(person: MultiviewTracker, share: Share) -> bool:
