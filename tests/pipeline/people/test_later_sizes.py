@@ -39,7 +39,7 @@ def seen(monkeypatch):
     """What frames show: how well the body measured facing the way it is tracked, and the other, overlaps."""
     now = SimpleNamespace(shows=True, side=True, overlaps=(0.8, 0.7), measured=[])
 
-    def measure(rng, make, expected, tracker, shares, poses):
+    def measure(make, expected, tracker, shares, poses):
         now.measured.append(poses)
         turned = not np.allclose(poses, POSE)
         overlaps = np.full(len(poses), now.overlaps[turned])

@@ -46,10 +46,10 @@ def _go_on_measured(member: Member, frames: list[Shown], time: float, known: boo
     expected, shares = subject.person.sizes, [frame.share for frame in frames]
     assert isinstance(expected, BoneSizes)
     make = partial(make_body, subject.tracker.settings.body)
-    found = measure(rng, make, expected, subject.tracker, shares, np.array([frame.pose for frame in frames]))
+    found = measure(make, expected, subject.tracker, shares, np.array([frame.pose for frame in frames]))
     lead = np.inf
     if not known:
-        other = measure(rng, make, expected, subject.tracker, shares, np.array([frame.turned for frame in frames]))
+        other = measure(make, expected, subject.tracker, shares, np.array([frame.turned for frame in frames]))
         lead = float(np.nan_to_num(found.overlaps).mean() - np.nan_to_num(other.overlaps).mean())
         found = found if lead >= 0 else other
     member.shown.clear()

@@ -21,8 +21,6 @@ from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTra
 from shadowpuppet.tracking.particle_filter import Particles
 from shadowpuppet.tracking.people.tracker import Share, is_shown, observed
 
-ROUNDS, CYCLES = 2, 4
-"""Number of rounds, each of which solves for the sizes and then fits the poses again; cycles of the tracker in which it does."""
 LEAST_POINTS = 100
 """Least number of surface points of a person in such a frame."""
 
@@ -47,30 +45,18 @@ def shows(share: Share) -> bool:
     return enough and is_shown(share)
 
 
-def measure(rng: np.random.Generator, make: Callable[[BoneSizes], Body], expected: BoneSizes, tracker: MultiviewTracker,
+def measure(make: Callable[[BoneSizes], Body], expected: BoneSizes, tracker: MultiviewTracker,
             shares: Sequence[Share], poses: Array) -> Measure:
     """Sizes that suit a person's shares of F frames, from poses (F, D) of a body of the `expected` sizes; `tracker`: of any body."""
-    spread, sizes, residual = size_deviations(expected, shown=False), expected, np.nan
-    settings = tracker.settings
-    tracker = replace(tracker, body=make(sizes), looks=0)
-    for _ in range(ROUNDS):
-        clouds = [observed(tracker, share).cloud(POINT_STRIDE) for share in shares]
-        pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
-        centre, pull = map(np.array, zip(*pulls, strict=True))
-        bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
-                              worth=INDEPENDENT_POINTS[settings.body])
-        sizes, residual, tracker = bundle.sizes, bundle.residual, replace(tracker, body=make(bundle.sizes))
-        states = [_fitted(rng, tracker, share, pose) for share, pose in zip(shares, bundle.poses)]
-        poses = np.array([state.pose for state in states])
-    return Measure(tracker, sizes, poses, np.array([state.overlap for state in states]), residual)
-
-
-def _fitted(rng: np.random.Generator, tracker: MultiviewTracker, share: Share, pose: Array) -> MultiviewState:
-    """The state of a pose (D,) fitted again to a share."""
-    observation, state = observed(tracker, share), at_pose(tracker, share.state, pose)
-    for _ in range(CYCLES):
-        state = tracker.cycle(rng, state, observation)
-    return state
+    settings, own = tracker.settings, replace(tracker, body=make(expected), looks=0)
+    clouds = [observed(own, share).cloud(POINT_STRIDE) for share in shares]
+    pulls = [own.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
+    centre, pull = map(np.array, zip(*pulls, strict=True))
+    bundle = solve_bundle(make, expected, size_deviations(expected, shown=False), poses, clouds, settings.surface, pull=pull, centre=centre,
+                          worth=INDEPENDENT_POINTS[settings.body])
+    own = replace(own, body=make(bundle.sizes))
+    overlaps = [observed(own, share).overlap(pose) for share, pose in zip(shares, bundle.poses)]
+    return Measure(own, bundle.sizes, bundle.poses, np.array(overlaps), bundle.residual)
 
 
 def at_pose(tracker: MultiviewTracker, state: MultiviewState, pose: Array) -> MultiviewState:
