@@ -1,10 +1,10 @@
 """Several people before several cameras: are they counted, followed and told apart, and how much worse is each than alone?
 
-    python benchmarks/people.py FOLDER [--films N ...] [--masks] [--particles N]
+    python benchmarks/people.py FOLDER [--films N ...] [--masks]
 
-Makes the films of `FILMS` in FOLDER unless they are there, of 2, 3, 4 and 6 people before 4, 5 and 8 cameras, tracks each from the films (or,
-with `--masks`, from the exact silhouettes), and prints a line for each and what was asked of all. Films in which people walk round each other
-are made once more with each of them alone.
+Makes the films of `FILMS` in FOLDER unless they are there, of 2, 3, 4 and 6 people before 4, 5 and 8 cameras, tracks each from the films
+(or, with `--masks`, from the exact silhouettes), and prints a line for each and what was asked of all. Films of two and three people who
+walk round each other are made once more with each of them alone.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from shadowpuppet.motion.synchronization import at_times
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.synthetic import Scene, Spec, synthesize
+from shadowpuppet.synthetic.company import Together
 from shadowpuppet.synthetic.spec_changes import SpecChanges, apply_changes
 
 COLUMNS = ("film", "people", "cameras", "count right, %", "longest ghost, s", "longest miss, s", "swaps", "errors, mm", "alone, mm",
@@ -47,7 +48,7 @@ FAR_OFF = 0.3
 class Film:
     """A made film of several people."""
 
-    together: str
+    together: Together
     people: int
     cameras: int
     seed: int
@@ -63,8 +64,8 @@ class Film:
     @property
     def spec(self) -> Spec:
         """The spec of the film."""
-        changes = SpecChanges(people=self.people, cameras=self.cameras, together=self.together, seconds=self.seconds,  # type: ignore[arg-type]
-                              size=self.size, rate=self.rate)
+        changes = SpecChanges(people=self.people, cameras=self.cameras, together=self.together, seconds=self.seconds, size=self.size,
+                              rate=self.rate)  # fmt: skip
         return apply_changes(changes, replace(Spec(scene=Scene(empty_seconds=1)), seed=self.seed))
 
     def alone(self, n: int) -> Spec:
@@ -172,10 +173,11 @@ def errors_alone(film: Film, folder: Path, options: Options) -> dict[str, float]
 def row(found: dict, alone: dict[str, float]) -> list[str]:
     """A line of the table."""
     film = found["film"]
-    listed = [" ".join(f"{each.get(f'truth_{n + 1}', np.nan):.0f}" for n in range(film.people)) for each in (found["errors"], alone) if each]
+    own, single = (" ".join(f"{each[f'truth_{n + 1}']:.0f}" if f"truth_{n + 1}" in each else "-" for n in range(film.people)) if each else ""
+                   for each in (found["errors"], alone))  # fmt: skip
     return [film.together, str(film.people), str(film.cameras), f"{100 * found['right']:.1f}", f"{found['ghost']:.1f}",
-            f"{found['missed']:.1f}", str(found["swaps"]), listed[0] if listed else "", listed[1] if alone else "", f"{found['uncertain']:.0f}",
-            f"{found['silent']:.1f}", f"{found['rate']:.1f}"]  # fmt: skip
+            f"{found['missed']:.1f}", str(found["swaps"]), own, single, f"{found['uncertain']:.0f}", f"{found['silent']:.1f}",
+            f"{found['rate']:.1f}"]  # fmt: skip
 
 
 def asked(every: list[dict], alone: dict[str, dict[str, float]]) -> list[str]:
@@ -188,14 +190,14 @@ def asked(every: list[dict], alone: dict[str, dict[str, float]]) -> list[str]:
     for most in (2, 4):
         some = [(each["swaps"], n) for each, n in zip(every, frames) if each["film"].people == most]
         if some:
-            swaps = sum(n for n, _ in some)
-            lines.append(f"swaps with {most} people: {swaps} in {sum(n for _, n in some)} frames (asked {0 if most == 2 else '1 in 1,000'})")
+            swaps, total, goal = sum(n for n, _ in some), sum(n for _, n in some), "0" if most == 2 else "1 in 1,000"
+            lines.append(f"swaps with {most} people: {swaps} in {total} frames (asked {goal})")
     for each in every:
         film, own = each["film"], alone.get(each["film"].name, {})
         if own:
             ratios = [each["errors"].get(name, np.nan) / error for name, error in own.items()]
-            lines.append(f"{film.people} people {film.together}: {' '.join(f'{ratio:.2f}' for ratio in ratios)} times the error alone "
-                         f"(asked {ALONE[film.people]:g})")
+            listed = " ".join(f"{ratio:.2f}" for ratio in ratios)
+            lines.append(f"{film.people} people {film.together}: {listed} times the error alone (asked {ALONE[film.people]:g})")
     return lines
 
 

@@ -1,4 +1,4 @@
-"""People of average sizes are measured where later frames show them, and go on with that body; fewer particles where nothing is in doubt."""
+"""People of average sizes are measured where later frames show them, and go on with that body; fewer particles without doubt."""
 
 from __future__ import annotations
 

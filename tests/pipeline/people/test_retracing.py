@@ -35,8 +35,8 @@ def motion(sizes=TALL, heading: float = 0.0, absent: tuple[int, ...] = ()) -> Mo
 
 def group(*parts: Part, measured_at: float = -np.inf, exchanges=(), doubted=()):
     subject = SimpleNamespace(body=BODY, person=SimpleNamespace(sizes=TALL), tracker=SimpleNamespace(body=BODY, number=4))
-    member = SimpleNamespace(number=1, facing=SimpleNamespace(parts=list(parts), doubted=dict.fromkeys(doubted)), measured_at=measured_at, subject=subject, rng=None, share=None,
-                             observation=None)  # fmt: skip
+    facing = SimpleNamespace(parts=list(parts), doubted=dict.fromkeys(doubted))
+    member = SimpleNamespace(number=1, facing=facing, measured_at=measured_at, subject=subject, rng=None, share=None, observation=None)
     return SimpleNamespace(members=[member], exchanges=list(exchanges), hull=SimpleNamespace(points=lambda masks: None))
 
 

@@ -32,7 +32,8 @@ def stout():
     for pose in poses:
         masks = actor.masks(body, pose)
         state = at_pose(tracker, MultiviewState(pose, 0 * pose, None, 0.0, 0.9, "tracked"), pose)
-        shares.append(Share(state, actor.hull().points(masks), masks, draw_person(tracker, pose), [np.zeros_like(mask[::2, ::2]) for mask in masks]))
+        nothing = [np.zeros_like(mask[::2, ::2]) for mask in masks]
+        shares.append(Share(state, actor.hull().points(masks), masks, draw_person(tracker, pose), nothing))
     return true, poses, shares, tracker
 
 
@@ -46,7 +47,8 @@ def test_sizes_come_nearer_to_the_person():
     assert found.poses.shape == poses.shape
 
 
-@pytest.mark.parametrize(("hidden", "status", "shown"), [(0, "tracked", True), (2, "tracked", True), (3, "tracked", False), (0, "lost", False)])
+@pytest.mark.parametrize(("hidden", "status", "shown"), [
+    (0, "tracked", True), (2, "tracked", True), (3, "tracked", False), (0, "lost", False)])
 def test_who_is_hidden_in_most_views_is_not_measured(hidden, status, shown):
     share = stout()[2][0]
     ignored = [np.full_like(mask, n < hidden) for n, mask in enumerate(share.ignored)]

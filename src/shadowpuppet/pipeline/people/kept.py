@@ -70,7 +70,8 @@ class KeptGroup(NamedTuple):
     exchanges: tuple[Exchange, ...]
 
 
-TYPES = (*MultiviewSubject.state_types, Shown, Share, Drawn, SurfacePoints, KeptMember, KeptGroup, Look, Figure, Step, Part, Doubted, Question, Exchange)
+TYPES = (*MultiviewSubject.state_types, Shown, Share, Drawn, SurfacePoints, KeptMember, KeptGroup, Look, Figure, Step, Part, Doubted,
+         Question, Exchange)  # fmt: skip
 """The named tuples in a `KeptGroup`."""
 
 

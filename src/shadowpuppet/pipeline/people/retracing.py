@@ -11,12 +11,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import BLANK, PER_FRAME, Motion, MotionBuilder, MotionFrame
 from shadowpuppet.pipeline.people.group import Group
 from shadowpuppet.pipeline.people.member import Member
@@ -57,7 +57,7 @@ class Packed(NamedTuple):
     """Seconds."""
     sizes: tuple[tuple[int, int] | None, ...]
     """Height and width of each camera's mask."""
-    bits: tuple[Array | None, ...]
+    bits: tuple[NDArray[np.uint8] | None, ...]
     """Their pixels, eight a byte."""
 
     def masks(self) -> list[Mask | None]:
@@ -138,7 +138,8 @@ def retraced(group: Group, motions: Mapping[int, Motion], wanted: Sequence[Stret
 
 
 def _start(member: Member, motion: Motion, until: float) -> MultiviewState | None:
-    """The state from which a person is followed backwards: that of the first frame known from a time (s) on; None if that is a second later."""
+    """The state from which a person is followed backwards: that of the first frame known from a time (s) on; None if that is
+    a second later."""
     known = np.flatnonzero(motion.known & (motion.times >= until - 1e-6) & (motion.times < until + 1))
     if not len(known):
         return None
@@ -157,8 +158,9 @@ def _followed_back(group: Group, motions: Mapping[int, Motion], number: int, sta
     found, leads = list[MotionFrame](), list[float]()
     for frame in reversed(frames):
         masks = frame.masks()
-        share = step({number: Person(tracker, member.rng, state)}, group.hull.points(masks), masks, _others(group, motions, number, frame.time))
-        share = keep_front(tracker, member.rng, state, share[number])
+        beside, person = _others(group, motions, number, frame.time), Person(tracker, member.rng, state)
+        share = step({number: person}, group.hull.points(masks), masks, beside)[number]
+        share = keep_front(tracker, member.rng, state, share)
         state, member.share = share.state, share
         lost = lost + 1 if state.status in BLANK else 0
         if lost > MOST_LOST:

@@ -301,7 +301,8 @@ class PeopleRun:
     def _write_person(self, member: Member) -> None:
         """Write the person's sizes, and what the look found of them."""
         subject = member.subject
-        write_beside(person_folder(self.folder, member.number), self.survey.look_with(subject.summary, subject.doubts), self.rig, subject.person)
+        look = self.survey.look_with(subject.summary, subject.doubts)
+        write_beside(person_folder(self.folder, member.number), look, self.rig, subject.person)
 
 
 def _together(drawn: Sequence[tuple[Bits, ...]]) -> tuple[Bits, ...]:

@@ -22,7 +22,7 @@ MIN_COUNTED = 2
 """Least number of these sets."""
 
 SURE, CERTAIN = 1.0, 1.5
-"""Evidence, in views, from which on a figure is a person beside two others; from which on it is a second person, seldom as it may be seen."""
+"""Evidence, in views, from which on a figure is a person beside two others; from which on it is a second person who is seldom seen."""
 
 
 @dataclass
