@@ -170,11 +170,16 @@ def errors_alone(film: Film, folder: Path, options: Options) -> dict[str, float]
     return found
 
 
+def listed(errors: dict[str, float], people: int) -> str:
+    """The errors (mm) of so many people, by the names of their truths, in a line; empty if there are none."""
+    names = [f"truth_{n + 1}" for n in range(people)]
+    return " ".join(f"{errors[name]:.0f}" if name in errors else "-" for name in names) if errors else ""
+
+
 def row(found: dict, alone: dict[str, float]) -> list[str]:
     """A line of the table."""
     film = found["film"]
-    own, single = (" ".join(f"{each[f'truth_{n + 1}']:.0f}" if f"truth_{n + 1}" in each else "-" for n in range(film.people)) if each else ""
-                   for each in (found["errors"], alone))  # fmt: skip
+    own, single = (listed(each, film.people) for each in (found["errors"], alone))
     return [film.together, str(film.people), str(film.cameras), f"{100 * found['right']:.1f}", f"{found['ghost']:.1f}",
             f"{found['missed']:.1f}", str(found["swaps"]), own, single, f"{found['uncertain']:.0f}", f"{found['silent']:.1f}",
             f"{found['rate']:.1f}"]  # fmt: skip
@@ -196,8 +201,8 @@ def asked(every: list[dict], alone: dict[str, dict[str, float]]) -> list[str]:
         film, own = each["film"], alone.get(each["film"].name, {})
         if own:
             ratios = [each["errors"].get(name, np.nan) / error for name, error in own.items()]
-            listed = " ".join(f"{ratio:.2f}" for ratio in ratios)
-            lines.append(f"{film.people} people {film.together}: {listed} times the error alone (asked {ALONE[film.people]:g})")
+            times = " ".join(f"{ratio:.2f}" for ratio in ratios)
+            lines.append(f"{film.people} people {film.together}: {times} times the error alone (asked {ALONE[film.people]:g})")
     return lines
 
 
