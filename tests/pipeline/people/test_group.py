@@ -61,7 +61,6 @@ def scene(monkeypatch):
     monkeypatch.setattr(fronts, "turn_round", other)
     monkeypatch.setattr(fronts, "follow_turned", other)
     monkeypatch.setattr(module, "follow_turned", other)
-    monkeypatch.setattr(module, "touching", lambda drawn, within: list(drawn))  # so that no tracker with fewer particles is made
     monkeypatch.setattr(fronts, "shows_side", lambda tracker, share: now.side)
     monkeypatch.setattr(later_sizes, "shows", lambda share: False)
     monkeypatch.setattr(module, "find_people", lambda floor, masks, explained=(): list(now.figures))

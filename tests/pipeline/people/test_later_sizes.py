@@ -1,4 +1,4 @@
-"""People of average sizes are measured where later frames show them, and go on with that body; fewer particles without doubt."""
+"""People of average sizes are measured where later frames show them, and go on with that body."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import pytest
 
 from shadowpuppet.io.person import Person
 from shadowpuppet.pipeline.people import later_sizes
-from shadowpuppet.pipeline.people import member as people_member
 from shadowpuppet.pipeline.people.later_sizes import SETS, measure_later
-from shadowpuppet.pipeline.people.member import SETTLED, Member
+from shadowpuppet.pipeline.people.member import Member
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -106,22 +105,3 @@ def test_an_unknown_front_is_not_measured_from_before_and_behind(seen):
     one.trial = SimpleNamespace(begun=0.0, state=SimpleNamespace(pose=POSE))
     watched(one, 2 * SETS)
     assert not seen.measured
-
-
-@pytest.mark.parametrize(("apart", "status", "known", "measured", "few"), [
-    (True, "tracked", True, True, True), (False, "tracked", True, True, False), (True, "uncertain", True, True, False),
-    (True, "tracked", False, True, False), (True, "tracked", True, False, False)])
-def test_fewer_particles_where_nothing_is_in_doubt(monkeypatch, apart, status, known, measured, few):
-    one = member(measured)
-    monkeypatch.setattr(people_member, "is_shown", lambda share: False)
-    one.settle(apart)
-    assert one.person.tracker.number == 40
-    monkeypatch.setattr(people_member, "is_shown", lambda share: True)
-    one.state, one.facing.is_known = one.state._replace(status=status), known
-    one.settle(apart)
-    assert one.person.tracker.number == (SETTLED if few else 40)
-    assert one.person.tracker.body is one.subject.body
-    if few:
-        assert one.person.tracker is one.person.tracker  # made once
-        one.subject = replace(one.subject, tracker=replace(one.subject.tracker, body=actor.body(height=1.6)), body=actor.body(height=1.6))
-        assert one.person.tracker.body is one.subject.body

@@ -24,7 +24,7 @@ from shadowpuppet.tracking.people.figures import Figure, drawn, find_people
 from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.identity import CLEAR, DIFFERENT, Exchange, Identity
 from shadowpuppet.tracking.people.presence import Followed, follow
-from shadowpuppet.tracking.people.tracker import explained, follow_turned, place_of, start, step, touching
+from shadowpuppet.tracking.people.tracker import Person, explained, follow_turned, place_of, start, step
 from shadowpuppet.tracking.unexplained import near
 
 LOOK_SECONDS = 0.2
@@ -39,8 +39,6 @@ SAME_PLACE = 0.6
 """Distance (m) from a person within which a figure is theirs."""
 SAME_HEIGHT = 0.1
 """Greatest difference (m) between the height of a person who enters and that of one who has left, if they may be the same."""
-APART = 0.4
-"""Distance (m) between the bodies of people who are apart."""
 CLOSE, WITHIN = 0.6, 0.2
 """Distance (m) of two people below which they may be exchanged; below which motion does not tell whether they were."""
 
@@ -98,7 +96,8 @@ class Group:
 
     def next(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None], images: Images = ()) -> None:
         """Update all people by a frame's surface points and masks (H, W), and the images that fit these, one per camera."""
-        people = {member.number: member.person for member in self.present}
+        people = {member.number: Person(member.subject.tracker, member.rng, member.state)
+                  for member in self.present if member.state is not None}  # fmt: skip
         for number, share in step(people, points, masks).items():
             member = self.members[number - 1]
             member.state, member.share = share.state, share
@@ -106,9 +105,6 @@ class Group:
             member.lost_since = (time if member.lost_since is None else member.lost_since) if lost else None
         with ThreadPoolExecutor(max(min(len(people), usable_cores()), 1), "people") as pool:
             list(pool.map(lambda number: face_the_way(self.members[number - 1], time), people))  # raises what one of them raised
-        near = touching({member.number: member.share.drawn for member in self.present if member.share is not None}, APART)
-        for member in self.present:
-            member.settle(member.number not in near)
         if time >= self.due:
             self.due = time + LOOK_SECONDS
             self._look(time, points, masks, images)

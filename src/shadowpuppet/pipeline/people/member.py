@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,15 +11,12 @@ import numpy as np
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.pipeline.person_rig import HullObservation, MultiviewSubject
-from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.multiview.tracker import MultiviewState
 from shadowpuppet.tracking.people.appearance import Colours
 from shadowpuppet.tracking.people.facing import Facing, Trial
 from shadowpuppet.tracking.people.figures import Figure
-from shadowpuppet.tracking.people.tracker import Person, Share, is_shown
+from shadowpuppet.tracking.people.tracker import Share
 from shadowpuppet.tracking.people.walking import Walk
-
-SETTLED = 16
-"""Number of particles for a person of whom nothing is in doubt, and who is apart from others: as with six cameras or more."""
 
 
 class Look(NamedTuple):
@@ -74,35 +71,12 @@ class Member:
     facing: Facing = field(default_factory=Facing)
     """Whether it is known which way the person faces: from the silhouettes at the beginning, or because they walked."""
 
-    is_settled: bool = False
-    """Whether fewer particles suffice: nothing is in doubt."""
     shown: list[Shown] = field(default_factory=list)
     """Frames in which the person, of average sizes so far, may be measured."""
     earlier: MultiviewSubject | None = None
     """The person of average sizes, before they were measured while they were tracked."""
     measured_at: float = -np.inf
     """When that was, seconds."""
-    _settled: MultiviewTracker | None = None
-
-    def settle(self, apart: bool) -> None:
-        """See whether fewer particles suffice in the next frame; `apart`: no other person is near."""
-        tracked = self.state is not None and self.state.status == "tracked" and self.subject.is_measured and self.facing.is_known
-        self.is_settled = apart and tracked and self.share is not None and is_shown(self.share)
-
-    @property
-    def person(self) -> Person:
-        """What a frame's step needs."""
-        assert self.state is not None
-        return Person(self.settled_tracker if self.is_settled else self.subject.tracker, self.rng, self.state)
-
-    @property
-    def settled_tracker(self) -> MultiviewTracker:
-        """The tracker with fewer particles."""
-        if self._settled is None or self._settled.body is not self.subject.body:
-            number = min(self.subject.tracker.number, SETTLED)
-            tracker = self.subject.tracker
-            self._settled = replace(tracker, settings=replace(tracker.settings, particles=number))
-        return self._settled
 
     def subject_at(self, time: float) -> MultiviewSubject:
         """The person as the frame of a time (s) was tracked."""

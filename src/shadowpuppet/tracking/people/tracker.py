@@ -38,7 +38,7 @@ TOUCHING = 0.25
 SIDED = 0.01
 """Least difference in overlap between a body and the same turned round that tells the front from the back."""
 VIEWS = 3
-"""Number of views that must show most of a person for few particles to suffice, and for sizes to be measured."""
+"""Number of views that must show most of a person apart from others for sizes to be measured."""
 SHOWN, SIDE = 0.6, np.radians(45)
 """Least share of the drawn body that a view shows apart from other people; least angle (rad) from the front or the back of a view from the
 side."""
@@ -194,12 +194,12 @@ def _turned_round(person: MultiviewTracker, state: MultiviewState) -> MultiviewS
     return state._replace(pose=pose, velocity=still, particles=particles)
 
 
-def touching(drawn: Mapping[int, Drawn], within: float = TOUCHING) -> list[int]:
-    """Numbers of the people whose bodies are less than `within`, metres, from another's."""
+def touching(drawn: Mapping[int, Drawn]) -> list[int]:
+    """Numbers of the people whose bodies are nearly in touch with another's."""
     close = set[int]()
     for n, one in drawn.items():
         for m, other in drawn.items():
-            if m > n and float((one.distances(other.centres) - other.radii).min()) < within:
+            if m > n and float((one.distances(other.centres) - other.radii).min()) < TOUCHING:
                 close |= {n, m}
     return sorted(close)
 
