@@ -11,7 +11,7 @@ import pytest
 
 from shadowpuppet.io.person import Person
 from shadowpuppet.pipeline.people import later_sizes
-from shadowpuppet.pipeline.people.later_sizes import SETS, measure_later
+from shadowpuppet.pipeline.people.later_sizes import ATTEMPTS, SETS, measure_later
 from shadowpuppet.pipeline.people.member import Member
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
@@ -36,9 +36,9 @@ def member(measured: bool = False) -> Member:
 @pytest.fixture
 def seen(monkeypatch):
     """What frames show: how well the body measured facing the way it is tracked, and the other, overlaps."""
-    now = SimpleNamespace(shows=True, side=True, overlaps=(0.8, 0.7), measured=[])
+    now = SimpleNamespace(shows=True, side=True, overlaps=(0.9, 0.8), measured=[])
 
-    def measure(make, expected, tracker, shares, poses):
+    def measure(rng, make, expected, tracker, shares, poses):
         now.measured.append(poses)
         turned = not np.allclose(poses, POSE)
         overlaps = np.full(len(poses), now.overlaps[turned])
@@ -82,7 +82,7 @@ def test_who_is_not_shown_or_has_been_measured_is_not(seen, shows, measured, ste
     assert not seen.measured
 
 
-@pytest.mark.parametrize(("overlaps", "known", "wrong"), [((0.8, 0.7), True, False), ((0.7, 0.8), True, True), ((0.8, 0.79), False, False)])
+@pytest.mark.parametrize(("overlaps", "known", "wrong"), [((0.9, 0.8), True, False), ((0.8, 0.9), True, True), ((0.9, 0.89), False, False)])
 def test_of_an_unknown_front_both_ways_are_measured(seen, overlaps, known, wrong):
     one, seen.overlaps = member(), overlaps
     other = POSE + 0.1
@@ -96,6 +96,14 @@ def test_of_an_unknown_front_both_ways_are_measured(seen, overlaps, known, wrong
     np.testing.assert_array_equal(one.state.pose, other if wrong else POSE)
     assert one.measured_at == time
     assert one.trial is None
+
+
+def test_sizes_that_fit_no_better_than_average_ones_are_not_taken(seen):
+    one, seen.overlaps = member(), (0.7, 0.6)
+    watched(one, 5 * SETS)
+    assert not one.subject.is_measured
+    assert one.earlier is None
+    assert len(seen.measured) == ATTEMPTS
 
 
 def test_an_unknown_front_is_not_measured_from_before_and_behind(seen):

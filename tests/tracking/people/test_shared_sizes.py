@@ -37,9 +37,9 @@ def stout():
     return true, poses, shares, tracker
 
 
-def test_sizes_come_nearer_to_the_person():
+def test_sizes_come_nearer_to_the_person(rng):
     true, poses, shares, tracker = stout()
-    found = measure(partial(make_body, "anatomical"), actor.sizes(), tracker, shares, poses)
+    found = measure(rng, partial(make_body, "anatomical"), actor.sizes(), tracker, shares, poses)
     before, after = (sum(abs(getattr(sizes, name) - getattr(true, name)) for name in GIRTHS) for sizes in (actor.sizes(), found.sizes))
     assert after < 0.75 * before
     assert found.tracker.body is not tracker.body

@@ -26,7 +26,7 @@ from shadowpuppet.tracking.people.presence import Followed
 from shadowpuppet.tracking.people.tracker import Share
 from shadowpuppet.tracking.people.walking import Step
 
-MEMBER = ("state", "height", "place", "lost_since", "before", "measured_at")
+MEMBER = ("state", "height", "place", "lost_since", "before", "measured_at", "attempts")
 """Fields of a `Member` that are kept as they are."""
 
 

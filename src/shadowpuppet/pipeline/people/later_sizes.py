@@ -20,13 +20,17 @@ from shadowpuppet.tracking.people.tracker import follow_turned, shows_side
 
 SETS, SECONDS = 8, 1.4
 """Number of frames in which a person is measured, and the least time from the first to the last of them."""
+ATTEMPTS = 2
+"""Number of attempts after which average sizes stay."""
 LEAD = 0.02
 """Least difference of the mean overlaps of the person measured facing one way and the other that tells the front."""
 
 
 def measure_later(member: Member, time: float) -> None:
     """Note what a frame shows of a person of average sizes; with enough frames, measure them, and go on with the body of these sizes."""
-    if member.subject.is_measured or member.share is None or member.state is None or member.lost_since is not None:
+    if member.subject.is_measured or member.attempts >= ATTEMPTS:
+        return
+    if member.share is None or member.state is None or member.lost_since is not None:
         return
     known = member.facing.is_known
     if not known and (member.trial is None or time - member.trial.begun < SETTLING):
@@ -46,13 +50,16 @@ def _go_on_measured(member: Member, frames: list[Shown], time: float, known: boo
     expected, shares = subject.person.sizes, [frame.share for frame in frames]
     assert isinstance(expected, BoneSizes)
     make = partial(make_body, subject.tracker.settings.body)
-    found = measure(make, expected, subject.tracker, shares, np.array([frame.pose for frame in frames]))
+    found = measure(rng, make, expected, subject.tracker, shares, np.array([frame.pose for frame in frames]))
     lead = np.inf
     if not known:
-        other = measure(make, expected, subject.tracker, shares, np.array([frame.turned for frame in frames]))
+        other = measure(rng, make, expected, subject.tracker, shares, np.array([frame.turned for frame in frames]))
         lead = float(np.nan_to_num(found.overlaps).mean() - np.nan_to_num(other.overlaps).mean())
         found = found if lead >= 0 else other
     member.shown.clear()
+    member.attempts += 1
+    if np.nan_to_num(found.overlaps).mean() < np.nan_to_num([share.state.overlap for share in shares]).mean():
+        return  # no better than the average sizes
     member.earlier, member.measured_at, member.subject = subject, time, _measured(subject, found, len(frames))
     member.before = None
     state = follow_turned(found.tracker, rng, at_pose(found.tracker, shares[-1].state, found.poses[-1]), shares[-1])

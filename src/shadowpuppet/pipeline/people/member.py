@@ -73,6 +73,8 @@ class Member:
 
     shown: list[Shown] = field(default_factory=list)
     """Frames in which the person, of average sizes so far, may be measured."""
+    attempts: int = 0
+    """How often that was tried."""
     earlier: MultiviewSubject | None = None
     """The person of average sizes, before they were measured while they were tracked."""
     measured_at: float = -np.inf

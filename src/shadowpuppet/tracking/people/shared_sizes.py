@@ -21,6 +21,8 @@ from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTra
 from shadowpuppet.tracking.particle_filter import Particles
 from shadowpuppet.tracking.people.tracker import Share, is_shown, observed
 
+CYCLES = 3
+"""Number of estimation cycles in which poses are fitted to the silhouettes of a frame."""
 LEAST_POINTS = 100
 """Least number of surface points of a person in such a frame."""
 
@@ -45,7 +47,7 @@ def shows(share: Share) -> bool:
     return enough and is_shown(share)
 
 
-def measure(make: Callable[[BoneSizes], Body], expected: BoneSizes, tracker: MultiviewTracker,
+def measure(rng: np.random.Generator, make: Callable[[BoneSizes], Body], expected: BoneSizes, tracker: MultiviewTracker,
             shares: Sequence[Share], poses: Array) -> Measure:
     """Sizes that suit a person's shares of F frames, from poses (F, D) of a body of the `expected` sizes; `tracker`: of any body."""
     settings, own = tracker.settings, replace(tracker, body=make(expected), looks=0)
@@ -55,8 +57,18 @@ def measure(make: Callable[[BoneSizes], Body], expected: BoneSizes, tracker: Mul
     bundle = solve_bundle(make, expected, size_deviations(expected, shown=False), poses, clouds, settings.surface, pull=pull, centre=centre,
                           worth=INDEPENDENT_POINTS[settings.body])
     own = replace(own, body=make(bundle.sizes))
-    overlaps = [observed(own, share).overlap(pose) for share, pose in zip(shares, bundle.poses)]
-    return Measure(own, bundle.sizes, bundle.poses, np.array(overlaps), bundle.residual)
+    states = [_fitted(rng, own, share, pose) for share, pose in zip(shares, bundle.poses)]
+    found, overlaps = np.array([state.pose for state in states]), np.array([state.overlap for state in states])
+    return Measure(own, bundle.sizes, found, overlaps, bundle.residual)
+
+
+def _fitted(rng: np.random.Generator, tracker: MultiviewTracker, share: Share, pose: Array) -> MultiviewState:
+    """The state of a pose (D,) fitted to a share, also to its silhouettes: sizes are solved on the surface points alone."""
+    single = replace(tracker, settings=replace(tracker.settings, cycles=1))
+    observation, state = observed(single, share), at_pose(single, share.state, pose)
+    for _ in range(CYCLES):
+        state = single.cycle(rng, state, observation)
+    return state
 
 
 def at_pose(tracker: MultiviewTracker, state: MultiviewState, pose: Array) -> MultiviewState:
