@@ -213,7 +213,7 @@ def main() -> None:
     parser.add_argument("--masks", action="store_true", help="exact silhouettes instead of the films")
     parser.add_argument("--tiny", action="store_true", help="one film of two people, of a few small pictures")
     args = smallest.parse(parser, lambda folder: (folder, "--tiny", "--masks"))
-    options, console = make_options({"masks": args.masks}), Console()
+    options, console = make_options({"masks": args.masks}), Console(width=150)
     films = [Film("dance", 2, 3, 1, 2.0, "96x72", 2.0)] if args.tiny else [FILMS[n] for n in args.films]
     table, every, alone = Table(*COLUMNS, box=None), list[dict](), dict[str, dict[str, float]]()
     for film in films:

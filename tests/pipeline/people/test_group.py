@@ -14,6 +14,7 @@ from shadowpuppet.pipeline.people import fronts, later_sizes
 from shadowpuppet.pipeline.people import group as module
 from shadowpuppet.pipeline.people.group import GONE_SECONDS, Group, first_people
 from shadowpuppet.pipeline.people.kept import TYPES, kept, restore
+from shadowpuppet.pipeline.people.member import Shown
 from shadowpuppet.tracking.people.appearance import nothing
 from shadowpuppet.tracking.people.facing import Trial
 from shadowpuppet.tracking.people.figures import Figure
@@ -196,6 +197,19 @@ def test_a_sudden_turn_raises_doubt_until_it_is_tried(scene):
     assert len(member.facing.parts) == 2
 
 
+def test_frames_that_show_no_side_do_not_count(scene):
+    scene.sided, scene.lead = False, -0.05
+    scene.run(1.0, figure(0))
+    (member,) = scene.group.members
+    assert member.trial is not None
+    scene.side = False
+    scene.run(2.0, figure(0))
+    assert not member.facing.is_known
+    scene.side = True
+    scene.run(2.0, figure(0))
+    assert member.facing.is_known
+
+
 @pytest.mark.parametrize(("lead", "kept"), [(0.01, True), (0.03, False)])
 def test_a_sudden_turn_is_undone_if_the_body_turned_back_fits_as_well(scene, lead, kept):
     scene.run(2.0, figure(0))
@@ -290,6 +304,8 @@ def test_a_group_goes_on_from_what_is_kept(scene, colours, tmp_path):
         member.subject.person = SimpleNamespace(sizes=average_sizes("anatomical", 1.7), height=1.7, source="")
         member.subject.summary, member.state = {"overlap": 0.9}, None
         member.trial = None if member.trial is None else Trial(member.trial.begun, None)
+        member.shown = [Shown(0.5, Share(None, None, (None,), None, (None,)), np.ones(3), None)]
+        member.earlier, member.measured_at = member.subject, 0.7
     write_nested(tmp_path / "kept.npz", kept(group))
     again = Group(None, None, None, np.random.default_rng(0))
     restore(again, read_nested(tmp_path / "kept.npz", TYPES), lambda held: group.members[0].subject)
@@ -297,5 +313,8 @@ def test_a_group_goes_on_from_what_is_kept(scene, colours, tmp_path):
     assert again.rng.spawn(1)[0].random() == group.rng.spawn(1)[0].random()
     assert [each.random() for each in (again.rng, *(member.rng for member in again.members))] == [
         each.random() for each in (group.rng, *(member.rng for member in group.members))]  # fmt: skip
+    for one, other in zip(again.members, group.members):
+        assert (one.shown[0].time, one.measured_at) == (other.shown[0].time, other.measured_at)
+        assert one.subject_at(0.6) is one.earlier
     (coming,), (look, *_) = again.coming, list(again.seen.values())[::-1]
     assert any(figure is coming.figures[-1] for figure in look.figures)
