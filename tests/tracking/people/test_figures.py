@@ -171,6 +171,20 @@ def test_the_floor_is_found_though_the_hull_reaches_below_it():
     assert find_floor(made, points, [masks]).level == pytest.approx(0.0, abs=0.06)
 
 
+def test_the_floor_is_the_world_s_where_figures_fit_it_nearly_as_well():
+    made = cameras(4)
+    masks = seen(made, body(-1, 0.3), body(1, 0))
+    assert find_floor(made, VisualHull(made).points(masks).points, [masks]).level == 0.0
+
+
+def test_a_floor_that_is_not_the_world_s_is_found():
+    made, drop = cameras(4), np.eye(4)
+    drop[2, 3] = 0.5  # the same scene in a world whose origin is half a metre above the floor
+    moved = [replace(camera, T_camera_world=camera.T_camera_world @ drop) for camera in made]
+    masks = seen(made, body(-1, 0.3), body(1, 0))
+    assert find_floor(moved, VisualHull(moved).points(masks).points, [masks]).level == pytest.approx(-0.5, abs=0.06)
+
+
 def test_a_figure_is_as_tall_as_its_silhouette_whatever_height_was_tried(rig):
     made, floor = rig
     masks = seen(made, body(0, 0, 1.95))
