@@ -66,3 +66,13 @@ def test_the_front_is_kept_unless_the_other_fits_clearly_better(monkeypatch, tur
     found = keep_front(tracker, np.random.default_rng(0), at(tracker, POSE), share)
     assert (found.state is other) == kept
     assert (found is share) != kept
+
+
+def test_a_body_that_comes_round_again_does_not_face_the_other_way(monkeypatch, rng):
+    tracker, masks = person(), actor.masks(actor.body(), POSE)
+    share = step({1: Person(tracker, rng, at(tracker, POSE))}, actor.hull().points(masks), masks)[1]
+    monkeypatch.setattr(module, "settle", lambda state, cycle: share.state)
+    monkeypatch.setattr(MultiviewTracker, "search", lambda self, rng, observation, facing: share.state)
+    found = turn_round(tracker, rng, share)
+    assert found.status == "lost"
+    assert found.overlap == 0

@@ -175,13 +175,13 @@ def observed(person: MultiviewTracker, share: Share) -> PersonObservation:
 
 def _facing_the_other_way(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState,
                           observation: PersonObservation) -> MultiviewState:
-    """The state of the body facing the other way: of the same pose turned round, or searched for, whichever fits better."""
-    turned = settle(_turned_round(person, state), lambda other: person.cycle(rng, other, observation))
+    """The state of the body facing the other way: of the same pose turned round, or searched for, whichever fits better; lost if both come
+    round again."""
     heading = person.body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
+    turned = settle(_turned_round(person, state), lambda other: person.cycle(rng, other, observation))
     found = person.search(rng, observation, float(state.pose[heading]) + np.pi)
-    if np.cos(found.pose[heading] - state.pose[heading]) > 0:  # it came round again
-        return turned
-    return max(turned, found, key=lambda other: np.nan_to_num(other.overlap))
+    other = [each for each in (turned, found) if np.cos(each.pose[heading] - state.pose[heading]) < 0]
+    return max(other, key=lambda each: np.nan_to_num(each.overlap)) if other else turned._replace(status="lost", overlap=0.0)
 
 
 def _turned_round(person: MultiviewTracker, state: MultiviewState) -> MultiviewState:
