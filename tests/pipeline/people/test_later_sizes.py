@@ -113,3 +113,11 @@ def test_an_unknown_front_is_not_measured_from_before_and_behind(seen):
     one.trial = SimpleNamespace(begun=0.0, state=SimpleNamespace(pose=POSE))
     watched(one, 2 * SETS)
     assert not seen.measured
+
+
+@pytest.mark.parametrize(("measured", "known", "forward", "sure"), [
+    (True, True, 0.0, True), (True, False, 0.9, False), (False, True, 0.9, True), (False, True, 0.0, False)])
+def test_who_has_average_sizes_is_vouched_for_while_they_walk_forwards(measured, known, forward, sure):
+    one = member(measured)
+    one.facing.is_known, one.walk = known, SimpleNamespace(forward=forward)
+    assert one.is_front_sure == sure

@@ -16,7 +16,7 @@ from shadowpuppet.tracking.people.appearance import Colours
 from shadowpuppet.tracking.people.facing import Facing, Trial
 from shadowpuppet.tracking.people.figures import Figure
 from shadowpuppet.tracking.people.tracker import Share
-from shadowpuppet.tracking.people.walking import Walk
+from shadowpuppet.tracking.people.walking import ALONG, Walk
 
 
 class Look(NamedTuple):
@@ -79,6 +79,12 @@ class Member:
     """The person of average sizes, before they were measured while they were tracked."""
     measured_at: float = -np.inf
     """When that was, seconds."""
+
+    @property
+    def is_front_sure(self) -> bool:
+        """Whether the frame may be vouched for: the front is known and, of a person of average sizes, who is taken for turned round more
+        easily, they walk forwards now."""
+        return self.facing.is_known and (self.subject.is_measured or self.walk.forward > ALONG)
 
     def subject_at(self, time: float) -> MultiviewSubject:
         """The person as the frame of a time (s) was tracked."""

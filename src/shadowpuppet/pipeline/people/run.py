@@ -269,7 +269,7 @@ class PeopleRun:
                 if not member.facing.is_known:
                     would_be = self._doubted(frame) if doubted else frame
                     member.facing.doubted[frame.time] = Doubted(would_be.status, tuple(would_be.limb_status or ()))
-                if doubted or not member.facing.is_known:
+                if doubted or not member.is_front_sure:
                     frame = self._doubted(frame)
             self._writer(member, stack).write(frame)
             if member.measured_at == seen.time:
