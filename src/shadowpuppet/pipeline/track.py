@@ -237,7 +237,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
             frames = stack.enter_context(closing(read_frames(survey.rig, segment, ready=options.masks, every=options.every)))
             if cache is not None:
                 frames = stack.enter_context(closing(cache.frames(frames, options)))
-frames = (seen._replace(masks=watch(seen.time, seen.masks, seen.own)) for seen in frames)
+            frames = (seen._replace(masks=watch(seen.time, seen.masks, seen.own)) for seen in frames)
             if store is not None:
                 frames = stack.enter_context(closing(store.stored(frames)))
             for found, seen in zip(earlier, frames):

@@ -10,9 +10,11 @@ import pytest
 from shadowpuppet.body.models import average_sizes
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.io.files.nested import read_nested, write_nested
+from shadowpuppet.pipeline.people import fronts, later_sizes
 from shadowpuppet.pipeline.people import group as module
 from shadowpuppet.pipeline.people.group import GONE_SECONDS, Group, first_people
 from shadowpuppet.pipeline.people.kept import TYPES, kept, restore
+from shadowpuppet.pipeline.people.member import Shown
 from shadowpuppet.tracking.people.appearance import nothing
 from shadowpuppet.tracking.people.facing import Trial
 from shadowpuppet.tracking.people.figures import Figure
@@ -29,7 +31,7 @@ def figure(x: float, height: float = 1.7) -> Figure:
 @pytest.fixture
 def scene(monkeypatch):
     """A group whose trackers follow people to their figure, and are lost where there is none; `figures` are those seen now."""
-    now = SimpleNamespace(figures=[], fits=0, refuse=False, facing=np.array([1.0, 0.0]), sided=True, measured=True, lead=0.0,
+    now = SimpleNamespace(figures=[], fits=0, refuse=False, facing=np.array([1.0, 0.0]), sided=True, measured=True, lead=0.0, side=True,
                           images=())
 
     def fit(rng, sets):
@@ -57,14 +59,17 @@ def scene(monkeypatch):
         state = next(each.state for each in given if isinstance(each, Share))
         return SimpleNamespace(place=state.place, pose=state.pose, status="tracked", overlap=state.overlap - now.lead, is_other=True)
 
-    monkeypatch.setattr(module, "turn_round", other)
+    monkeypatch.setattr(fronts, "turn_round", other)
+    monkeypatch.setattr(fronts, "follow_turned", other)
     monkeypatch.setattr(module, "follow_turned", other)
+    monkeypatch.setattr(fronts, "shows_side", lambda tracker, share: now.side)
+    monkeypatch.setattr(later_sizes, "shows", lambda share: False)
     monkeypatch.setattr(module, "find_people", lambda floor, masks, explained=(): list(now.figures))
     monkeypatch.setattr(module, "explained", lambda drawn, number: [])
     monkeypatch.setattr(module, "place_of", lambda body, state: state.place)
     monkeypatch.setattr(module, "step", step)
     monkeypatch.setattr(module, "start", start)
-    monkeypatch.setattr(module, "step_of", lambda body, pose, time: Step(time, pose[:2], now.facing))
+    monkeypatch.setattr(fronts, "step_of", lambda body, pose, time: Step(time, pose[:2], now.facing))
     now.group = Group(None, None, fit, np.random.default_rng(0))
     now.time = 0.0
 
@@ -143,7 +148,7 @@ def test_who_is_carried_backwards_is_turned_round_if_that_fits(scene, monkeypatc
             scene.facing = -scene.facing
         return SimpleNamespace(**vars(share.state) | {"overlap": 0.78 if fits else 0.7})
 
-    monkeypatch.setattr(module, "turn_round", turn)
+    monkeypatch.setattr(fronts, "turn_round", turn)
     scene.run(1.0, figure(0))
     for n in range(20):
         scene.run(STEP, figure(0.1 * n))
@@ -162,12 +167,13 @@ def test_where_a_person_faces_is_known_from_silhouettes_or_when_they_walk(scene,
     assert member.facing.is_known
 
 
-@pytest.mark.parametrize(("lead", "known", "turned"), [(0.05, True, False), (-0.05, True, True), (0.01, False, False)])
-def test_who_stands_is_followed_both_ways_until_one_is_better(scene, lead, known, turned):
-    scene.sided, scene.lead = False, lead
+@pytest.mark.parametrize(("lead", "side", "known", "turned"), [
+    (0.05, True, True, False), (-0.05, True, True, True), (0.01, True, False, False), (0.05, False, False, False)])
+def test_who_stands_is_followed_both_ways_until_one_is_better_from_the_side(scene, lead, side, known, turned):
+    scene.sided, scene.lead, scene.side = False, lead, side
     scene.run(1.0, figure(0))
     (member,) = scene.group.members
-    assert member.trial is not None
+    assert (member.trial is not None) == side
     states = []
     for _ in range(20):
         scene.run(STEP, figure(0))
@@ -189,6 +195,31 @@ def test_a_sudden_turn_raises_doubt_until_it_is_tried(scene):
     scene.run(2.0, figure(0))
     assert member.facing.is_known
     assert len(member.facing.parts) == 2
+
+
+def test_frames_that_show_no_side_do_not_count(scene):
+    scene.sided, scene.lead = False, -0.05
+    scene.run(1.0, figure(0))
+    (member,) = scene.group.members
+    assert member.trial is not None
+    scene.side = False
+    scene.run(2.0, figure(0))
+    assert not member.facing.is_known
+    scene.side = True
+    scene.run(2.0, figure(0))
+    assert member.facing.is_known
+
+
+@pytest.mark.parametrize(("lead", "kept"), [(0.01, True), (0.03, False)])
+def test_a_sudden_turn_is_undone_if_the_body_turned_back_fits_as_well(scene, lead, kept):
+    scene.run(2.0, figure(0))
+    (member,) = scene.group.members
+    scene.facing, scene.lead = -scene.facing, lead
+    scene.run(STEP, figure(0))
+    assert hasattr(member.state, "is_other") == kept
+    assert member.share.state is member.state
+    assert member.facing.is_known == kept
+    assert len(member.facing.parts) == 2 - kept
 
 
 def dressed(bin: int):
@@ -273,6 +304,8 @@ def test_a_group_goes_on_from_what_is_kept(scene, colours, tmp_path):
         member.subject.person = SimpleNamespace(sizes=average_sizes("anatomical", 1.7), height=1.7, source="")
         member.subject.summary, member.state = {"overlap": 0.9}, None
         member.trial = None if member.trial is None else Trial(member.trial.begun, None)
+        member.shown = [Shown(0.5, Share(None, None, (None,), None, (None,)), np.ones(3), None)]
+        member.earlier, member.measured_at = member.subject, 0.7
     write_nested(tmp_path / "kept.npz", kept(group))
     again = Group(None, None, None, np.random.default_rng(0))
     restore(again, read_nested(tmp_path / "kept.npz", TYPES), lambda held: group.members[0].subject)
@@ -280,5 +313,8 @@ def test_a_group_goes_on_from_what_is_kept(scene, colours, tmp_path):
     assert again.rng.spawn(1)[0].random() == group.rng.spawn(1)[0].random()
     assert [each.random() for each in (again.rng, *(member.rng for member in again.members))] == [
         each.random() for each in (group.rng, *(member.rng for member in group.members))]  # fmt: skip
+    for one, other in zip(again.members, group.members):
+        assert (one.shown[0].time, one.measured_at) == (other.shown[0].time, other.measured_at)
+        assert one.subject_at(0.6) is one.earlier
     (coming,), (look, *_) = again.coming, list(again.seen.values())[::-1]
     assert any(figure is coming.figures[-1] for figure in look.figures)

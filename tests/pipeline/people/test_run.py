@@ -225,6 +225,14 @@ def test_who_comes_later_is_counted(seen):
     assert census.numbers == (1,) * FRAMES + (2,) * FRAMES
 
 
+def test_who_is_there_for_a_twelfth_of_the_film_is_counted(seen):
+    rig, masks = seen
+    alone = [[seen_by(camera, people(n)[0]) for camera in rig] for n in range(FRAMES)]
+    census = take_census(rig, alone * 2, [*alone, *alone[:4], *masks[:2]])
+    assert census is not None
+    assert census.number == 2
+
+
 def test_parts_of_a_picture_that_may_be_people():
     mask = np.zeros((40, 60), bool)
     assert people_in(mask) == 0

@@ -34,7 +34,7 @@ def test_postures_are_placed_where_the_points_are_in_all_directions(name):
     assert facing[root[3]] == pytest.approx(0)
 
 
-def found_in(pose, rng, number: int = 4, name: str = "anatomical", library=None):
+def found_in(pose, rng, number: int = 4, name: str = "anatomical", library=None, facing=None):
     of = actor.body(name)
     observation = MultiviewObservation(BodyInViews(of, ()), actor.surface(of, pose, np.random.default_rng(1), 25, 0.004), ())
     refiner = Refiner(of)
@@ -43,7 +43,7 @@ def found_in(pose, rng, number: int = 4, name: str = "anatomical", library=None)
         costs = refiner.costs(poses, observation.full)
         return costs, -costs / 1e-6
 
-    return of, search(rng, of, refiner, observation, library, weigh, number)
+    return of, search(rng, of, refiner, observation, library, weigh, number, facing)
 
 
 @pytest.mark.parametrize("heading", [0.1, 1.3, 3.1, -2.0])
@@ -55,6 +55,14 @@ def test_a_person_is_found_whichever_way_they_face(heading, rng):
     assert (found.poses.shape, found.costs.shape, found.log_weights.shape) == ((4, 32), (4,), (4,))
     assert (np.diff(found.costs) >= 0).all()
     np.testing.assert_array_equal(found.poses, of.skeleton.clamp(found.poses))
+
+
+@pytest.mark.parametrize("turn", [0.5, np.pi])
+def test_a_person_is_searched_for_about_a_direction(turn, rng):
+    pose = actor.stance(actor.body().skeleton, 0.35, 0.4)
+    of, found = found_in(pose, rng, facing=0.4 + turn)
+    assert np.cos(found.best[3] - 0.4 - turn) > 0
+    assert (actor.apart(of, found.best, pose)[0] < 0.03) == (turn < 1)
 
 
 @pytest.mark.parametrize(("hips", "knees", "bow"), [(80, 92, 4), (6, 84, 3), (4, 8, -84), (4, 8, 82)])

@@ -46,7 +46,7 @@ def test_where_people_overlap_it_is_one_of_them():
         (ignored,) = ignored_pixels(person, [rest], [mask])
         assert ignored is not None
         assert ignored[10:20, 15:20].all()  # the shared columns
-        (own,) = own_masks(person, [rest], [mask])
+        (own,) = own_masks(person, [mask], [ignored])
         assert own is not None
         assert np.count_nonzero(own & block((30, 40))) == np.count_nonzero(block((30, 40)))
 
@@ -67,7 +67,7 @@ def test_an_empty_pixel_beside_others_still_counts():
 
 def test_no_mask_no_evidence():
     assert ignored_pixels(drawn(1, 9), [], [None]) == [None]
-    assert own_masks(drawn(1, 9), [], [None]) == [None]
+    assert own_masks(drawn(1, 9), [None], [None]) == [None]
 
 
 def test_points_belong_to_the_nearest_body():
@@ -92,8 +92,9 @@ def test_evidence_is_divided_again_among_other_bodies():
     assert own.cameras.tolist() == [0]
     assert ignored is not None
     assert ignored[10:20, 20:26].all()
-    (seen,) = divided.share(1)[1]
+    _, (seen,), (same,) = divided.share(1)
     assert seen is not None
+    np.testing.assert_array_equal(same, ignored)
     assert not (seen & block((40, 52))).any()
 
 

@@ -13,7 +13,7 @@ from solids import Ellipsoid, ring, seen_by
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.people.figures import EMPTY, NEW, ROWS, Figure, _height, _score, drawn, find_floor, find_people, telling
 from shadowpuppet.tracking.people.floor import ASIDE, HEIGHTS, LEGS, MOST_PLACES, POINTS, TRUNK, figure_points, floor_under, pixel_index
-from shadowpuppet.tracking.people.presence import Followed, counted, follow
+from shadowpuppet.tracking.people.presence import Followed, certain_number, counted, follow, sure_number
 
 ROUND = np.array([[-2.0, -2, 0], [2, 2, 1.8], [0, 0, 0], [-1, 1, 1], [1, -1, 1]])
 
@@ -171,6 +171,20 @@ def test_the_floor_is_found_though_the_hull_reaches_below_it():
     assert find_floor(made, points, [masks]).level == pytest.approx(0.0, abs=0.06)
 
 
+def test_the_floor_is_the_world_s_where_figures_fit_it_nearly_as_well():
+    made = cameras(4)
+    masks = seen(made, body(-1, 0.3), body(1, 0))
+    assert find_floor(made, VisualHull(made).points(masks).points, [masks]).level == 0.0
+
+
+def test_a_floor_that_is_not_the_world_s_is_found():
+    made, drop = cameras(4), np.eye(4)
+    drop[2, 3] = 0.5  # the same scene in a world whose origin is half a metre above the floor
+    moved = [replace(camera, T_camera_world=camera.T_camera_world @ drop) for camera in made]
+    masks = seen(made, body(-1, 0.3), body(1, 0))
+    assert find_floor(moved, VisualHull(moved).points(masks).points, [masks]).level == pytest.approx(-0.5, abs=0.06)
+
+
 def test_a_figure_is_as_tall_as_its_silhouette_whatever_height_was_tried(rig):
     made, floor = rig
     masks = seen(made, body(0, 0, 1.95))
@@ -205,6 +219,20 @@ def test_figures_are_followed_by_nearness():
                                                  ([3], 1), ([2] * 8 + [3, 3], 3), ([2] * 10 + [3, 3], 2)])  # fmt: skip
 def test_a_number_counts_if_it_is_seen_often(numbers, people):
     assert counted(numbers) == people
+
+
+@pytest.mark.parametrize(("evidence", "sure", "certain"), [
+    ((), 0, 0), ((0.7,), 1, 0), ((3.0, 0.7), 2, 1), ((3.0, 2.0, 0.9), 2, 2), ((3.0, 2.0, 1.1, 0.8), 3, 2), ((0.9, 0.8, 0.7), 2, 0)])
+def test_weak_figures_beside_two_people_do_not_count(evidence, sure, certain):
+    figures = [Figure(np.zeros(2), 1.7, each) for each in evidence]
+    assert sure_number(figures) == sure
+    assert certain_number(figures) == certain
+
+
+def test_a_second_person_who_is_certain_counts_where_there_are_few_frames_of_them():
+    assert counted([1] * 22 + [2] * 2) == 1
+    assert counted([1] * 22 + [2] * 2, share=0.0) == 2
+    assert counted([1] * 23 + [2], share=0.0) == 1
 
 
 def test_the_floor_is_bounded():

@@ -19,7 +19,7 @@ from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.people.figures import Figure, find_floor, find_people, telling
 from shadowpuppet.tracking.people.floor import Floor
-from shadowpuppet.tracking.people.presence import counted
+from shadowpuppet.tracking.people.presence import certain_number, counted, sure_number
 from shadowpuppet.video.seeking import Seeker
 
 SETS = 12
@@ -89,8 +89,9 @@ def take_census(cameras: Sequence[Camera], sets: Sequence[Sequence[Mask | None]]
     if len(everywhere) < FEW_POINTS:
         return None
     floor = find_floor(cameras, everywhere, [sets[n] for n in evenly_spread(len(sets), FLOOR_SETS)])
-    numbers = tuple(len(find_people(floor, masks)) for masks in sets)
-    return Census(max(counted(numbers[:begun]), counted(numbers[begun:])), floor, numbers)
+    seen = [find_people(floor, masks) for masks in sets]
+    numbers, certain = tuple(map(sure_number, seen)), [certain_number(figures) for figures in seen]
+    return Census(max(counted(numbers[:begun]), counted(numbers[begun:]), counted(certain, share=0.0)), floor, numbers)
 
 
 def count_in_picture(sample: Sample, silhouettes: Silhouettes) -> int:

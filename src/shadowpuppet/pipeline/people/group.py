@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,23 +12,21 @@ from numpy.typing import NDArray
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array
-from shadowpuppet.pipeline.person_rig import HullObservation, MultiviewSubject
+from shadowpuppet.pipeline.people.fronts import face_the_way
+from shadowpuppet.pipeline.people.later_sizes import measure_later
+from shadowpuppet.pipeline.people.member import Fit, Look, Member, Sighting
+from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
-from shadowpuppet.tracking.multiview.tracker import MultiviewState
 from shadowpuppet.tracking.people.appearance import Colours, apart_from, colours_of_body, colours_of_figure, dressed_parts
 from shadowpuppet.tracking.people.evidence import Drawn, draw_person, predicted
-from shadowpuppet.tracking.people.facing import LONGEST_TRIAL, Facing, Trial
 from shadowpuppet.tracking.people.figures import Figure, drawn, find_people
 from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.identity import CLEAR, DIFFERENT, Exchange, Identity
 from shadowpuppet.tracking.people.presence import Followed, follow
-from shadowpuppet.tracking.people.tracker import Person, Share, explained, follow_turned, place_of, start, step, turn_round
-from shadowpuppet.tracking.people.walking import ALONG, Walk, step_of
+from shadowpuppet.tracking.people.tracker import Person, explained, follow_turned, place_of, start, step
 from shadowpuppet.tracking.unexplained import near
 
-TURN_LOSS = 0.05
-"""Overlap by which a body turned round may fit worse if the person walks that way: among others front and back differ by 0.02."""
 LOOK_SECONDS = 0.2
 """Seconds from one look for people to the next."""
 NEW_SECONDS, NEW_LOOKS = 0.5, 3
@@ -47,54 +44,6 @@ CLOSE, WITHIN = 0.6, 0.2
 
 Images = Sequence[NDArray[np.uint8] | None]
 """A picture (H, W, 3) or (H, W) a camera; empty: clothes are not looked at."""
-
-
-class Look(NamedTuple):
-    """A moment at which people were looked for."""
-
-    figures: Sequence[Figure]
-    masks: Sequence[Mask | None]
-    worn: Sequence[Colours | None]
-    """Colours of each figure; None for people who are tracked, and without pictures."""
-
-
-Sighting = tuple[Figure, Sequence[Figure], Sequence[Mask | None]]
-"""A person in a frame set: their figure, the others', and the masks (H, W) by camera."""
-Fit = Callable[[np.random.Generator, Sequence[Sighting]], MultiviewSubject]
-"""Measures a person where they are seen, and makes the tracker."""
-
-
-@dataclass(eq=False)
-class Member:
-    """One person of a recording."""
-
-    number: int
-    """Counted from 1, in the order in which they came."""
-    subject: MultiviewSubject
-    rng: np.random.Generator
-    state: MultiviewState | None
-    """None: gone."""
-    height: float
-    """Of the figure, metres."""
-    place: Array
-    """Where the figure was first seen, of shape (2,), metres."""
-    lost_since: float | None = None
-    before: Any = None
-    """What the doubt about the next frame needs."""
-    share: Share | None = None
-    """The evidence of the last frame."""
-    walk: Walk = field(default_factory=Walk)
-    trial: Trial | None = None
-    """The person facing the other way, while it is not known which way is right."""
-    facing: Facing = field(default_factory=Facing)
-    """Whether it is known which way the person faces: from the silhouettes at the beginning, or because they walked."""
-
-    @property
-    def observation(self) -> HullObservation:
-        """This person's part of the last frame."""
-        assert self.share is not None
-        seen = sum(mask is not None and bool(mask.any()) for mask in self.share.masks)
-        return HullObservation(self.share.points, self.share.masks, seen)
 
 
 @dataclass(eq=False)
@@ -155,60 +104,13 @@ class Group:
             lost = share.state.status == "lost"
             member.lost_since = (time if member.lost_since is None else member.lost_since) if lost else None
         with ThreadPoolExecutor(max(min(len(people), usable_cores()), 1), "people") as pool:
-            list(pool.map(lambda number: self._face_the_way(self.members[number - 1], time), people))  # raises what one of them raised
+            list(pool.map(lambda number: face_the_way(self.members[number - 1], time), people))  # raises what one of them raised
         if time >= self.due:
             self.due = time + LOOK_SECONDS
             self._look(time, points, masks, images)
         for member in self.present:
             if member.lost_since is not None and time - member.lost_since >= GONE_SECONDS:
                 member.state = member.share = member.lost_since = member.before = None
-
-    def _face_the_way(self, member: Member, time: float) -> None:
-        """Turn a person round whose body moves backwards: beside others the silhouettes hardly distinguish front and back, but people
-        walk forwards."""
-        if member.state is None or member.share is None or member.lost_since is not None:
-            member.walk.lose()
-            member.trial = None
-            return
-        member.walk.add(step_of(member.subject.body, member.state.pose, time))
-        if (since := member.walk.jerked) is not None:
-            member.facing.begin(since, is_known=False)
-            member.walk.forget()
-            member.trial = None
-        if member.walk.forward > ALONG:
-            member.facing.show(time, wrong=False)
-        elif member.walk.forward < -ALONG:
-            turned = turn_round(member.subject.tracker, member.rng, member.share)
-            if np.nan_to_num(member.state.overlap) - np.nan_to_num(turned.overlap) <= TURN_LOSS:
-                self._turn(member, time, turned)
-            else:
-                member.walk.forget()
-                member.facing.is_known = False
-        self._try_both_ways(member, member.share, time)
-
-    def _try_both_ways(self, member: Member, share: Share, time: float) -> None:
-        """Follow a person of unknown front as facing the other way too, until that is clearly better or worse."""
-        tracker, trial = member.subject.tracker, member.trial
-        if member.facing.is_known or not member.subject.is_measured:  # with average sizes both ways fit too alike
-            member.trial = None
-        elif trial is None or time - trial.begun > LONGEST_TRIAL:
-            member.trial = Trial(time, turn_round(tracker, member.rng, share))
-        else:
-            trial.add(time, follow_turned(tracker, member.rng, trial.state, share), share.state.overlap)
-            if (right := trial.is_right(time)) is not None:
-                member.trial = None
-                if right:
-                    member.facing.show(time, wrong=False)
-                else:
-                    self._turn(member, time, trial.state)
-
-    @staticmethod
-    def _turn(member: Member, time: float, turned: MultiviewState) -> None:
-        """Replace a person's state by that of the body turned round, which is right."""
-        assert member.share is not None
-        member.facing.show(time, wrong=True)
-        member.walk.forget()
-        member.state, member.share = turned, member.share._replace(state=turned)
 
     def _look(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None], images: Images) -> None:
         """See who is who, and find new, returning and lost people among the figures that no tracked body explains."""
@@ -219,6 +121,8 @@ class Group:
         free = [figure for figure in figures if all(np.linalg.norm(place - figure.place) > SAME_PLACE for place in places)]
         worn = self._gather(time, drawn, free, masks, images) if any(image is not None for image in images) else [None] * len(free)
         self._tell_apart(time)
+        for member in self.present:
+            measure_later(member, time)
         self.looks += 1
         of_free = {id(figure): colours for figure, colours in zip(free, worn)}
         self.seen[self.looks] = Look(figures, masks, [of_free.get(id(figure)) for figure in figures])

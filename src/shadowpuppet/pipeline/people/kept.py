@@ -14,15 +14,19 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.fitting import unsettled
-from shadowpuppet.pipeline.people.group import Group, Look, Member
+from shadowpuppet.pipeline.people.group import Group
+from shadowpuppet.pipeline.people.member import Look, Member, Shown
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, known_person
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.people.evidence import Drawn
 from shadowpuppet.tracking.people.facing import Doubted, Facing, Part, Trial
 from shadowpuppet.tracking.people.figures import Figure
 from shadowpuppet.tracking.people.identity import Clothes, Exchange, Question
 from shadowpuppet.tracking.people.presence import Followed
+from shadowpuppet.tracking.people.tracker import Share
 from shadowpuppet.tracking.people.walking import Step
 
-MEMBER = ("state", "height", "place", "lost_since", "before")
+MEMBER = ("state", "height", "place", "lost_since", "before", "measured_at", "attempts")
 """Fields of a `Member` that are kept as they are."""
 
 
@@ -41,6 +45,9 @@ class KeptMember(NamedTuple):
     steps: tuple[Step, ...]
     trial: tuple[Any, ...] | None
     """When it began, its state and leads."""
+    shown: tuple[Shown, ...]
+    earlier: tuple[Any, ...] | None
+    """Sizes, height (m), how they were found and summary of the person before they were measured while they were tracked."""
     facing: tuple[Any, ...]
     """Whether it is known, the parts, and for each frame that is doubted its time (s) and what it would be."""
 
@@ -63,7 +70,8 @@ class KeptGroup(NamedTuple):
     exchanges: tuple[Exchange, ...]
 
 
-TYPES = (*MultiviewSubject.state_types, KeptMember, KeptGroup, Look, Figure, Step, Part, Doubted, Question, Exchange)
+TYPES = (*MultiviewSubject.state_types, Shown, Share, Drawn, SurfacePoints, KeptMember, KeptGroup, Look, Figure, Step, Part, Doubted,
+         Question, Exchange)  # fmt: skip
 """The named tuples in a `KeptGroup`."""
 
 
@@ -81,7 +89,9 @@ def _kept_member(member: Member) -> KeptMember:
     subject, facing, trial = member.subject, member.facing, member.trial
     return KeptMember(subject.person.sizes.to_array(), (subject.person.height, subject.person.source), subject.summary, subject.is_measured,
                       member.rng.bit_generator.state, tuple(getattr(member, name) for name in MEMBER), tuple(member.walk.steps),
-                      None if trial is None else (trial.begun, trial.state, tuple(trial.leads)),
+                      None if trial is None else (trial.begun, trial.state, tuple(trial.leads)), tuple(member.shown),
+                      None if member.earlier is None else (member.earlier.person.sizes.to_array(), member.earlier.person.height,
+                                                           member.earlier.person.source, member.earlier.summary),
                       (facing.is_known, tuple(facing.parts), tuple(facing.doubted.items())))  # fmt: skip
 
 
@@ -93,6 +103,9 @@ def restore(group: Group, held: KeptGroup, remake: Callable[[KeptMember], Multiv
     """Make a group without people that of a checkpoint; `remake`: makes a person of known sizes, and the tracker."""
     for each in held.members:
         _restore_member(group, each, remake(each))
+        if each.earlier is not None:
+            sizes, height, source, summary = each.earlier
+            group.members[-1].earlier = remake(each._replace(sizes=sizes, person=(height, source), summary=summary, is_measured=False))
     group.rng.bit_generator.state = dict(held.generator)
     group.seen = {int(n): look for n, look in held.seen.items()}
     group.coming = [Followed(list(times), [group.seen[n].figures[k] for n, k in zip(sets, which)], list(sets))
@@ -107,7 +120,7 @@ def _restore_member(group: Group, held: KeptMember, subject: MultiviewSubject) -
     for name, value in zip(MEMBER, held.fields):
         setattr(member, name, value)
     member.rng.bit_generator.state = dict(held.generator)
-    member.walk.steps = deque(held.steps)
+    member.walk.steps, member.shown = deque(held.steps), list(held.shown)
     if held.trial is not None:
         begun, state, leads = held.trial
         member.trial = Trial(begun, state)

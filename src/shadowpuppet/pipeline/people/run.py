@@ -28,8 +28,10 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.overlay_video import overlay_of_people
 from shadowpuppet.pipeline.people.census import Census
 from shadowpuppet.pipeline.people.fitting import fit_apart
-from shadowpuppet.pipeline.people.group import Group, Look, Member, first_people, seen_in
+from shadowpuppet.pipeline.people.group import Group, first_people, seen_in
 from shadowpuppet.pipeline.people.kept import TYPES, KeptGroup, kept, remade, restore
+from shadowpuppet.pipeline.people.member import Look, Member
+from shadowpuppet.pipeline.people.retracing import Packed, Stretch, packed, retraced, stretches, with_final_bodies
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.pipeline.progress import (
     FALLBACK_RATE,
@@ -48,6 +50,7 @@ from shadowpuppet.pipeline.progress import (
 from shadowpuppet.pipeline.rig import FrameSet, Rig, read_frames
 from shadowpuppet.pipeline.subject import joint_names, motion_frame
 from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
+from shadowpuppet.tracking.frozen import Interval
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.people.exchanges import given_back
@@ -102,6 +105,7 @@ class PeopleRun:
         self.folder: Path = self.writer.folder
         self.writers = dict[int, RunWriter]()
         self.metrics = dict[str, Any]()
+        self.aside: Sequence[Interval] = ()
 
     def track(self, for_fit: np.random.Generator, for_track: np.random.Generator, smooth: Smooth) -> dict[int, dict[str, Any]]:
         """Track all people; returns each person's metrics by number, none if no person is found."""
@@ -130,7 +134,23 @@ class PeopleRun:
             body, sizes = member.subject.body, member.subject.person.sizes
             assert isinstance(sizes, BoneSizes)  # of a whole body
             motions[number], people[number] = member.facing.corrected(writer.motion, body, sizes), (body, sizes)
+        motions = with_final_bodies(group, motions)
+        if wanted := stretches(group, motions):
+            self.listener.begin("following people back to the beginning")
+            motions = retraced(group, motions, wanted, self._silhouettes_of(wanted))
         return given_back(motions, group.exchanges, people)
+
+    def _silhouettes_of(self, wanted: Sequence[Stretch]) -> list[Packed]:
+        """The silhouettes of some stretches, read again, without those of cameras that were set aside."""
+        segment, last, found = [each.following() for each in self.survey.silhouettes], max(each.until for each in wanted), list[Packed]()
+        with closing(read_frames(self.rig, segment, ready=self.options.masks, every=self.options.every)) as frames:
+            for seen in frames:
+                if seen.time >= last:
+                    break
+                if any(each.begin - 1e-6 <= seen.time < each.until for each in wanted):
+                    aside = {each.camera for each in self.aside if each.begin <= seen.time <= each.end}
+                    found.append(packed(seen.time, [None if n in aside else mask for n, mask in enumerate(seen.masks)]))
+        return found
 
     def _finished(self, number: int, truth: Path | None) -> dict[str, Any]:
         """The metrics of a person's finished run, written into its folder."""
@@ -181,10 +201,11 @@ class PeopleRun:
         earlier = iter(self._earlier(group, carried, stack))
 
         def judged(seen: FrameSet, found: Mapping[int, MotionFrame], is_clear: bool) -> None:
-            drawn = [group.members[n - 1].subject.drawn(frame) for n, frame in found.items()]
+            subjects = {n: group.members[n - 1].subject_at(frame.time) for n, frame in found.items()}
+            drawn = [subjects[n].drawn(frame) for n, frame in found.items()]
             watch.tracked(_together(drawn) if is_clear else ())
             if overlay is not None:
-                overlay.write(overlay_of_people(seen, [(n, frame, group.members[n - 1].subject.pictures) for n, frame in found.items()]))
+                overlay.write(overlay_of_people(seen, [(n, frame, subjects[n].pictures) for n, frame in found.items()]))
 
         try:
             for seen in timer.each("wait", frames):
@@ -207,6 +228,7 @@ class PeopleRun:
                     checkpoints.keep(partial(self._keep, group, places, clear, begun))
                 self.listener.advance(len(clear))
         finally:
+            self.aside = watch.intervals
             count = len(clear) - (0 if carried is None else len(carried.clear))
             self.metrics |= timings(timer, STAGES, count, time.perf_counter() - began) | set_aside(watch.intervals, self.rig.names)
 
@@ -247,9 +269,11 @@ class PeopleRun:
                 if not member.facing.is_known:
                     would_be = self._doubted(frame) if doubted else frame
                     member.facing.doubted[frame.time] = Doubted(would_be.status, tuple(would_be.limb_status or ()))
-                if doubted or not member.facing.is_known:
+                if doubted or not member.is_front_sure:
                     frame = self._doubted(frame)
             self._writer(member, stack).write(frame)
+            if member.measured_at == seen.time:
+                self._write_person(member)
             here = frame.status not in ("absent", "lost") and member.state is not None
             place = place_of(member.subject.body, member.state) if here and member.state is not None else np.full(2, np.nan)
             write_place(places, seen.time, member.number, frame.status, place)
@@ -271,8 +295,14 @@ class PeopleRun:
         self.writers[member.number] = stack.enter_context(writer)
         frames = writer.go_on(number) if number else []
         writer.begin()
-        write_beside(folder, self.survey.look_with(subject.summary, subject.doubts), self.rig, subject.person)
+        self._write_person(member)
         return frames
+
+    def _write_person(self, member: Member) -> None:
+        """Write the person's sizes, and what the look found of them."""
+        subject = member.subject
+        look = self.survey.look_with(subject.summary, subject.doubts)
+        write_beside(person_folder(self.folder, member.number), look, self.rig, subject.person)
 
 
 def _together(drawn: Sequence[tuple[Bits, ...]]) -> tuple[Bits, ...]:

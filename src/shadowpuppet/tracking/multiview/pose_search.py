@@ -34,10 +34,11 @@ PULL = 1e-4
 
 
 def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: MultiviewObservation, library: ArrayLike | None,
-           weigh: Weigh, number: int) -> Particles:
+           weigh: Weigh, number: int, facing: float | None = None) -> Particles:
     """The `number` best poses (number, D) for a frame's surface points, with the costs and weights of `weigh`.
 
-    `library`: initial poses (L, D); their position and heading are ignored.
+    `library`: initial poses (L, D); their position and heading are ignored. `facing`: heading (rad) from which poses begin less than a
+    quarter turn away; None: in all headings.
     """
     postures = usual_postures(body.skeleton)
     known = np.asarray([] if library is None else library, float)
@@ -46,6 +47,9 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
             known = known[np.sort(rng.choice(len(known), MAX_LIBRARY_POSES, replace=False))]
         postures = np.concatenate([known, postures])
     poses = place_postures(body, postures, observation.full.origin)
+    if facing is not None:
+        heading = body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
+        poses = poses[np.cos(poses[:, heading] - facing) > 1e-6]
     share, _, tau = COARSE_STAGES[0]
     poses = poses[refiner.costs(poses, observation.cloud(share), tau).argsort(kind="stable")[:COARSE_CANDIDATES]]
     poses = best_of((evaluate(_refined(refiner, observation, poses, COARSE_STAGES), weigh),), FINE_CANDIDATES).poses

@@ -163,10 +163,10 @@ class MultiviewTracker:
             pose = particles.best if s.estimate == "best" else normalise(particles.log_weights) @ particles.poses
         return self.judge(pose, pose - state.pose, particles, observation, weigh)
 
-    def search(self, rng: np.random.Generator, observation: MultiviewObservation) -> MultiviewState:
-        """A state from this frame alone: the best of many poses in all directions, refined."""
+    def search(self, rng: np.random.Generator, observation: MultiviewObservation, facing: float | None = None) -> MultiviewState:
+        """A state from this frame alone: the best of many poses in all directions, or about `facing` (rad), refined."""
         weigh = self.weigh(observation)
-        found = pose_search.search(rng, self.body, self.refiner, observation, self.library, weigh, self.number)
+        found = pose_search.search(rng, self.body, self.refiner, observation, self.library, weigh, self.number, facing)
         still = np.zeros_like(found.best)
         state = self.judge(found.best, still, found, observation, weigh)
         return settle(state, lambda state: self.cycle(rng, state, observation)._replace(velocity=still))

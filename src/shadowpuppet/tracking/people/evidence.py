@@ -119,9 +119,10 @@ class Division:
         """A person's surface points, and the pixels (H / 2, W / 2) of each camera that say nothing of them."""
         return self.points_of(n), ignored_pixels(self.drawn[n], [self.drawn[m] for m in self.others(n)], self.masks)
 
-    def share(self, n: int) -> tuple[SurfacePoints, list[Mask | None]]:
-        """A person's surface points and silhouettes (H, W), one per camera."""
-        return self.points_of(n), own_masks(self.drawn[n], [self.drawn[m] for m in self.others(n)], self.masks)
+    def share(self, n: int) -> tuple[SurfacePoints, list[Mask | None], list[Mask | None]]:
+        """A person's surface points, silhouettes (H, W), one per camera, and the pixels (H / 2, W / 2) of each that say nothing of them."""
+        points, ignored = self.of(n)
+        return points, own_masks(self.drawn[n], self.masks, ignored), ignored
 
     def with_bodies(self, drawn: Mapping[int, Drawn]) -> Division:
         """The same evidence, divided among other bodies where there are some in `drawn`."""
@@ -162,10 +163,11 @@ def _around(drawn: Mask) -> Mask:
     return np.asarray(cv2.dilate(drawn.view(np.uint8), np.ones((2 * radius + 1,) * 2, np.uint8)), np.uint8).view(np.bool_)
 
 
-def own_masks(drawn: Drawn, others: Sequence[Drawn], masks: Sequence[Mask | None]) -> list[Mask | None]:
-    """For each camera the silhouette (H, W) of one person: without pixels that say nothing of them, unless they are drawn there."""
+def own_masks(drawn: Drawn, masks: Sequence[Mask | None], ignored: Sequence[Mask | None]) -> list[Mask | None]:
+    """For each camera the silhouette (H, W) of one person: without pixels (H / 2, W / 2) that say nothing of them, unless they are drawn
+    there."""
     found = list[Mask | None]()
-    for mask, out, body in zip(masks, ignored_pixels(drawn, others, masks), drawn.masks):
+    for mask, out, body in zip(masks, ignored, drawn.masks):
         if mask is None or out is None:
             found.append(None)
             continue

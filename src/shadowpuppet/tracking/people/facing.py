@@ -23,6 +23,8 @@ from shadowpuppet.tracking.multiview.tracker import MultiviewState
 
 SETTLING, LEAST_TRIAL, LONGEST_TRIAL = 0.4, 1.0, 3.0
 """Seconds after which the overlaps of a trial count; from which on it is decided; after which it begins again."""
+LEAST_LEADS = 3
+"""Number of frames that show the person from the side from which on a trial is decided."""
 CLEARLY = 0.02
 """Least mean difference of the overlaps that decides."""
 
@@ -36,15 +38,16 @@ class Trial:
         self.leads = list[float]()
         """By how much the body as it is fitted better (overlap)."""
 
-    def add(self, time: float, state: MultiviewState, overlap: float) -> None:
-        """The next state of the body turned round, and the overlap of the body as it is."""
+    def add(self, time: float, state: MultiviewState, overlap: float, counts: bool = True) -> None:
+        """The next state of the body turned round, and the overlap of the body as it is. `counts`: whether the frame shows the person
+        from the side."""
         self.state = state
-        if time - self.begun >= SETTLING:
+        if counts and time - self.begun >= SETTLING:
             self.leads.append(float(np.nan_to_num(overlap) - np.nan_to_num(state.overlap)))
 
     def is_right(self, time: float) -> bool | None:
         """Whether the body as it is faces the right way; None if that is not clear yet."""
-        if time - self.begun < LEAST_TRIAL or not self.leads:
+        if time - self.begun < LEAST_TRIAL or len(self.leads) < LEAST_LEADS:
             return None
         lead = float(np.mean(self.leads))
         return lead > 0 if abs(lead) >= CLEARLY else None

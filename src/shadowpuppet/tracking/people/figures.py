@@ -112,7 +112,9 @@ def find_floor(cameras: Sequence[Camera], points: Array, sets: Sequence[Sequence
         about = best(np.array([0.0, *np.percentile(points[:, 2], (0.5, 2, 5, 10))]))
         about = best(about + COARSE)
         levels = about + FINE
-        found = np.array(list(pool.map(evidence, levels)))
+        found, at_zero = np.array(list(pool.map(evidence, levels))), evidence(0.0)
+    if at_zero >= ALIKE * found.max():
+        return floor_under(cameras, points, 0.0)  # the world's, by convention: where silhouettes lack feet figures fit many levels alike
     # evidence changes little within some centimetres, so that the greatest is chance: the middle of the levels with nearly as much
     return floor_under(cameras, points, float(np.average(levels, weights=np.maximum(found - ALIKE * found.max(), 1e-9))))
 

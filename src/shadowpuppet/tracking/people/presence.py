@@ -21,6 +21,9 @@ COUNTED = 0.2
 MIN_COUNTED = 2
 """Least number of these sets."""
 
+SURE, CERTAIN = 1.0, 1.5
+"""Evidence, in views, from which on a figure is a person beside two others; from which on it is a second person who is seldom seen."""
+
 
 @dataclass
 class Followed:
@@ -49,9 +52,21 @@ class Followed:
         return self.figures[-1].place
 
 
-def counted(numbers: Sequence[int]) -> int:
-    """Number of people in a recording from the numbers seen in some frame sets: the greatest that is seen often enough to be no chance."""
-    least = max(MIN_COUNTED, COUNTED * len(numbers))
+def sure_number(figures: Sequence[Figure]) -> int:
+    """Number of people in a frame set's figures: without those beyond the second that have less than a whole view of evidence, as what
+    bodies leave over where they reach beyond their figures may look like a person."""
+    return max(sum(figure.evidence >= SURE for figure in figures), min(len(figures), 2))
+
+
+def certain_number(figures: Sequence[Figure]) -> int:
+    """Number of people in a frame set's figures that are certain, but 2 at most."""
+    return min(sum(figure.evidence >= CERTAIN for figure in figures), 2)
+
+
+def counted(numbers: Sequence[int], share: float = COUNTED) -> int:
+    """Number of people in a recording from the numbers seen in some frame sets: the greatest that is seen often enough to be no chance, in
+    a `share` of the sets and in `MIN_COUNTED`."""
+    least = max(MIN_COUNTED, share * len(numbers))
     return max((n for n in set(numbers) if sum(each >= n for each in numbers) >= least), default=min(max(numbers, default=0), 1))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,9 @@ from shadowpuppet.tracking.people.evidence import (
     picked,
     predicted,
 )
+from shadowpuppet.tracking.people.facing import CLEARLY
 from shadowpuppet.tracking.people.figures import Figure
+from shadowpuppet.tracking.people.walking import TURN
 from shadowpuppet.tracking.recovery import settle
 from shadowpuppet.tracking.unexplained import near
 
@@ -34,6 +37,11 @@ TOUCHING = 0.25
 """Distance of two people's bodies below which they are estimated twice in a frame: the second time on evidence divided by the first."""
 SIDED = 0.01
 """Least difference in overlap between a body and the same turned round that tells the front from the back."""
+VIEWS = 3
+"""Number of views that must show most of a person apart from others for sizes to be measured."""
+SHOWN, SIDE = 0.6, np.radians(45)
+"""Least share of the drawn body that a view shows apart from other people; least angle (rad) from the front or the back of a view from the
+side."""
 ROUND_FIGURE = 0.6
 """Distance (m) from a figure up to which surface points are searched for its person."""
 
@@ -64,16 +72,20 @@ class Share(NamedTuple):
     """This person's silhouettes (H, W), one per camera."""
     drawn: Drawn
     """The body in its new pose."""
+    ignored: Sequence[Mask | None] = ()
+    """Pixels (H / 2, W / 2) of each camera that say nothing of this person."""
 
 
-def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Mask | None]) -> dict[int, Share]:
+def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Mask | None],
+         beside: Mapping[int, Drawn] = MappingProxyType({})) -> dict[int, Share]:
     """The people's states after a frame's surface points and masks (H, W), one per camera, of all of them together.
 
     Each on the evidence that the others' bodies, in their predicted poses, do not explain; people who touch once more, with all bodies as
-    found. A lost person's body explains nothing. Cores share the people: none of them depends on another's result.
+    found. A lost person's body explains nothing. Cores share the people: none of them depends on another's result. `beside`: other people,
+    whose poses in this frame are known.
     """
     drawn = {n: draw_person(person.tracker, predicted(person.tracker.body, person.state)) for n, person in people.items()}
-    evidence = Division(drawn, {n for n, person in people.items() if person.state.status == "lost"}, points, masks)
+    evidence = Division({**drawn, **beside}, {n for n, person in people.items() if person.state.status == "lost"}, points, masks)
 
     def follow(n: int, evidence: Division) -> tuple[MultiviewState, Drawn]:
         tracker, rng, state = people[n]
@@ -84,11 +96,15 @@ def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Ma
     with ThreadPoolExecutor(max(min(len(people), usable_cores()), 1), "people") as pool:
         found = dict(zip(people, pool.map(lambda n: follow(n, evidence), people)))
         evidence = evidence.with_bodies({n: body for n, (_, body) in found.items()})
-        if close := touching(evidence.drawn):
+        if close := [n for n in touching(evidence.drawn) if n in people]:
             found |= dict(zip(close, pool.map(lambda n: follow(n, evidence), close)))
             evidence = evidence.with_bodies({n: found[n][1] for n in close})
         own = dict(zip(people, pool.map(evidence.share, people)))
-    return {n: Share(state, *own[n], body) for n, (state, body) in found.items()}
+    shares = dict[int, Share]()
+    for n, (state, body) in found.items():
+        own_points, own_silhouettes, ignored = own[n]
+        shares[n] = Share(state, own_points, own_silhouettes, body, ignored)
+    return shares
 
 
 def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, drawn: Mapping[int, Drawn], points: SurfacePoints,
@@ -108,26 +124,64 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
     found = person.search(rng, observation)  # beside others front and back hardly differ: both are tried
     other = _facing_the_other_way(person, rng, found, observation)
     best = max(found, other, key=lambda state: np.nan_to_num(state.overlap))
-    return Begun(_judged(best), bool(abs(found.overlap - other.overlap) >= SIDED))
+    share = Share(best, own, list(masks), draw_person(person, best.pose), observation.left_out)
+    return Begun(_judged(best), bool(abs(found.overlap - other.overlap) >= SIDED) and shows_side(person, share))
 
 
 def turn_round(person: MultiviewTracker, rng: np.random.Generator, share: Share) -> MultiviewState:
     """The person of a share facing the other way, fitted to the same evidence."""
-    return _judged(_facing_the_other_way(person, rng, share.state, _observation(person, share)))
+    return _judged(_facing_the_other_way(person, rng, share.state, observed(person, share)))
 
 
 def follow_turned(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState, share: Share) -> MultiviewState:
     """The state after one of the body turned round, from the evidence of a share."""
-    return _judged(person.cycle(rng, state, _observation(person, share)))
+    return _judged(person.cycle(rng, state, observed(person, share)))
 
 
-def _observation(person: MultiviewTracker, share: Share) -> PersonObservation:
-    return PersonObservation(person.views, share.points, share.masks)
+def views_apart(share: Share) -> list[int]:
+    """Indices of the cameras that show most of a person's body where no other person's is."""
+    return [n for n, (body, ignored) in enumerate(zip(share.drawn.masks, share.ignored))
+            if ignored is not None and body.any() and np.count_nonzero(body & ~ignored) >= SHOWN * np.count_nonzero(body)]  # fmt: skip
+
+
+def is_shown(share: Share) -> bool:
+    """Whether enough views show most of a person apart from others: three, or all of fewer cameras."""
+    return len(views_apart(share)) >= min(VIEWS, len(share.drawn.masks))
+
+
+def shows_side(person: MultiviewTracker, share: Share) -> bool:
+    """Whether a camera shows a person from the side, apart from others: outlines of people seen from before and behind do not differ."""
+    x, y, _, heading = share.state.pose[person.body.skeleton.dof_indices(GLOBAL_DOFS)].tolist()
+    ways = [person.cameras[n].centre[:2] - (x, y) for n in views_apart(share)]
+    return any(abs(way @ (np.cos(heading), np.sin(heading))) < np.cos(SIDE) * np.linalg.norm(way) for way in ways)
+
+
+def keep_front(person: MultiviewTracker, rng: np.random.Generator, before: MultiviewState, share: Share) -> Share:
+    """The share of a person whose front was known in the state `before`, of the frame beside: facing that way, unless the body turned round
+    fits clearly better."""
+    heading = person.body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
+    if share.state.status == "lost" or np.cos(share.state.pose[heading] - before.pose[heading]) > np.cos(TURN):
+        return share
+    turned = turn_round(person, rng, share)
+    if turned.status == "lost" or np.nan_to_num(share.state.overlap) - np.nan_to_num(turned.overlap) >= CLEARLY:
+        return share
+    return share._replace(state=turned, drawn=draw_person(person, turned.pose))
+
+
+def observed(person: MultiviewTracker, share: Share) -> PersonObservation:
+    """What a share shows of a person, as it was followed."""
+    return PersonObservation(person.views, share.points, share.masks, None, share.ignored)
 
 
 def _facing_the_other_way(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState,
                           observation: PersonObservation) -> MultiviewState:
-    return settle(_turned_round(person, state), lambda other: person.cycle(rng, other, observation))
+    """The state of the body facing the other way: of the same pose turned round, or searched for, whichever fits better; lost if both come
+    round again."""
+    heading = person.body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
+    turned = settle(_turned_round(person, state), lambda other: person.cycle(rng, other, observation))
+    found = person.search(rng, observation, float(state.pose[heading]) + np.pi)
+    other = [each for each in (turned, found) if np.cos(each.pose[heading] - state.pose[heading]) < 0]
+    return max(other, key=lambda each: np.nan_to_num(each.overlap)) if other else turned._replace(status="lost", overlap=0.0)
 
 
 def _turned_round(person: MultiviewTracker, state: MultiviewState) -> MultiviewState:

@@ -1,0 +1,78 @@
+"""People followed among others: whose bodies are known, and which way they face."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import actor
+import numpy as np
+import pytest
+
+from shadowpuppet.tracking.multiview.settings import MultiviewSettings
+from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.people import tracker as module
+from shadowpuppet.tracking.people.evidence import Drawn, draw_person
+from shadowpuppet.tracking.people.shared_sizes import at_pose
+from shadowpuppet.tracking.people.tracker import Person, Share, keep_front, step, turn_round
+
+POSE = actor.stance(actor.body().skeleton, 0.3, 0.2)
+HEADING = 3
+
+
+def person() -> MultiviewTracker:
+    return MultiviewTracker(actor.body(), actor.cameras(), MultiviewSettings(particles=8))
+
+
+def at(tracker: MultiviewTracker, pose, overlap: float = 0.8) -> MultiviewState:
+    return at_pose(tracker, MultiviewState(pose, 0 * pose, None, 0.0, overlap, "tracked"), pose)
+
+
+def test_a_body_beside_takes_its_points(rng):
+    """What another's known body explains is no evidence; where it is far it takes nothing."""
+    tracker, masks = person(), actor.masks(actor.body(), POSE)
+    points = actor.hull().points(masks)
+    body = draw_person(tracker, POSE)
+    away = Drawn(tuple(np.zeros_like(mask) for mask in body.masks), body.centres + np.array([5.0, 0, 0]), body.radii)
+    alone, beside = (step({1: Person(tracker, np.random.default_rng(0), at(tracker, POSE))}, points, masks, others)[1]
+                     for others in ({}, {2: away}))  # fmt: skip
+    assert len(beside.points.points) == len(alone.points.points) > 0.9 * len(points.points)
+    np.testing.assert_array_equal(beside.state.pose, alone.state.pose)
+    wider = body._replace(radii=body.radii + 0.05)
+    share = step({1: Person(tracker, rng, at(tracker, POSE))}, points, masks, {2: wider})[1]
+    assert len(share.points.points) < 0.1 * len(alone.points.points)
+    assert all(ignored[mask[::2, ::2]].mean() > 0.9 for ignored, mask in zip(share.ignored, masks))
+
+
+def test_the_other_way_is_searched_for(rng):
+    tracker, masks = person(), actor.masks(actor.body(), POSE)
+    points = actor.hull().points(masks)
+    wrong = POSE.copy()
+    wrong[HEADING] += np.pi  # with the sides of the right way
+    share = step({1: Person(tracker, rng, at(tracker, POSE))}, points, masks)[1]
+    found = turn_round(tracker, rng, share._replace(state=at(tracker, wrong)))
+    assert np.cos(found.pose[HEADING] - POSE[HEADING]) > 0.9
+    assert actor.apart(actor.body(), found.pose, POSE)[0] < 0.04
+    assert found.overlap > 0.85
+
+
+@pytest.mark.parametrize(("turn", "overlap", "turned", "kept"), [
+    (np.pi, 0.8, 0.79, True), (np.pi, 0.8, 0.77, False), (0.5, 0.8, 0.9, False), (np.pi, 0.8, np.nan, False)])
+def test_the_front_is_kept_unless_the_other_fits_clearly_better(monkeypatch, turn, overlap, turned, kept):
+    tracker, now = person(), POSE.copy()
+    now[HEADING] += turn
+    other = at(tracker, POSE, turned)._replace(status="lost" if np.isnan(turned) else "tracked")
+    monkeypatch.setattr(module, "turn_round", lambda *given: other)
+    share = Share(at(tracker, now, overlap), SimpleNamespace(), [], Drawn((), np.zeros((0, 3)), np.zeros(0)))
+    found = keep_front(tracker, np.random.default_rng(0), at(tracker, POSE), share)
+    assert (found.state is other) == kept
+    assert (found is share) != kept
+
+
+def test_a_body_that_comes_round_again_does_not_face_the_other_way(monkeypatch, rng):
+    tracker, masks = person(), actor.masks(actor.body(), POSE)
+    share = step({1: Person(tracker, rng, at(tracker, POSE))}, actor.hull().points(masks), masks)[1]
+    monkeypatch.setattr(module, "settle", lambda state, cycle: share.state)
+    monkeypatch.setattr(MultiviewTracker, "search", lambda self, rng, observation, facing: share.state)
+    found = turn_round(tracker, rng, share)
+    assert found.status == "lost"
+    assert found.overlap == 0
