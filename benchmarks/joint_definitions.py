@@ -1,4 +1,4 @@
-"""How much of a run's error is another definition of the joints: constant offsets from its joints to the truth's, in the frames of the limbs.
+"""How much of a run's error is another definition of the joints: offsets from its joints to the truth's, constant in the limbs' frames.
 
     python benchmarks/joint_definitions.py RECORDING RUN [--pixels 5.6]
 

@@ -115,7 +115,8 @@ class Case:
         values = dict(values)
         training, preset = values.pop("training", True), values.pop("preset", "default")
         taller, larger, told = values.pop("height", 1.0), values.pop("sizes", 1.0), self.rig.recording.subject.height
-        options = make_options({"preset": preset, "multiview": values, "height": told if taller == 1 else taller * (told or AVERAGE_HEIGHT)})
+        height = told if taller == 1 else taller * (told or AVERAGE_HEIGHT)
+        options = make_options({"preset": preset, "multiview": values, "height": height})
         settings = options.multiview
         key = json.dumps([settings.body, training, seed, taller])
         if key not in self.subjects:
