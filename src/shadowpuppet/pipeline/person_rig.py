@@ -32,7 +32,7 @@ from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.multiview import Before, MultiviewDoubt
 from shadowpuppet.tracking.doubt.steps import Trail
 from shadowpuppet.tracking.multiview.settings import for_rate, for_smeared
-from shadowpuppet.tracking.multiview.size_estimation import common_deviations, estimate_height, estimate_sizes, size_deviations
+from shadowpuppet.tracking.multiview.size_estimation import estimate_height, estimate_sizes, size_deviations
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles
@@ -149,7 +149,7 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
         spread = size_deviations(sizes, shown=False)
     library = known.poses if len(known.poses) else None
     person = estimate_sizes(rng, partial(make_body, settings.body), sizes, spread, cameras, first, settings, library,
-                            len(first) // 2 if settings.patience else 0, common_deviations(sizes, known.sizes is not None))
+                            len(first) // 2 if settings.patience else 0)
     prior = known.prior if settings.method == "hybrid" else None
     summary: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,
                                "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}

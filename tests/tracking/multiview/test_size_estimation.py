@@ -18,7 +18,6 @@ from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.size_estimation import (
     JOINT_DEVIATION,
     SIZES_FROM_JOINTS,
-    common_deviations,
     estimate_height,
     estimate_sizes,
     observed_height,
@@ -45,11 +44,11 @@ def stout() -> tuple[AnatomicalSizes, np.ndarray, list]:
     return true, poses, [(actor.hull().points(row), row) for row in masks]
 
 
-def measured(spread, first=None, expected=MEAN, seed: int = 0, library=None, together=None):
+def measured(spread, first=None, expected=MEAN, seed: int = 0, library=None):
     first = stout()[2] if first is None else first
     library = actor.walk(actor.body().skeleton, 12) if library is None else library
     make = partial(make_body, "anatomical")
-    return estimate_sizes(np.random.default_rng(seed), make, expected, spread, actor.cameras(), first, SETTINGS, library, together=together)
+    return estimate_sizes(np.random.default_rng(seed), make, expected, spread, actor.cameras(), first, SETTINGS, library)
 
 
 def test_girths_are_found_where_the_bones_are_known():
@@ -75,30 +74,6 @@ def test_a_height_is_enough_to_begin_with():
     before, after = (sum(getattr(sizes, name) for name in long) for sizes in (short, found.sizes))
     true = sum(getattr(stout()[0], name) for name in long)
     assert abs(after - true) < 0.6 * abs(before - true)
-
-
-def test_sizes_that_are_all_too_great_shrink_together():
-    """By a twentieth: the error of the bones is less than half of what it was, and less than without common causes."""
-    true = stout()[0]
-    large = AnatomicalSizes.from_array(1.05 * true.to_array())
-    spread, together = size_deviations(large, shown=False), common_deviations(large, shown=False)
-    alone, found = (measured(spread, expected=large, together=each).sizes for each in (None, together))
-    long = ("thigh_length", "shank_length", "upper_arm_length", "forearm_length", "lumbar_height", "thorax_height", "shoulder_distance")
-    before, apart, after = (sum(abs(getattr(sizes, name) - getattr(true, name)) for name in long) for sizes in (large, alone, found))
-    assert after < 0.5 * before
-    assert after < apart
-
-
-def test_common_causes_move_what_they_are_about():
-    rows = common_deviations(MEAN, shown=False)
-    assert rows is not None
-    stature, girth, clothes = (dict(zip(NAMES, row)) for row in rows)
-    assert all(stature[name] == pytest.approx(0.03 * getattr(MEAN, name)) for name in NAMES)
-    assert girth["thigh_length"] == clothes["thigh_length"] == girth["head_width"] == clothes["hand_width"] == clothes["neck_width"] == 0
-    assert girth["thigh_width"] > 2 * girth["wrist_width"] > 0
-    assert clothes["thigh_width"] == clothes["pelvis_depth"] > 0
-    assert common_deviations(MEAN, shown=True) is None
-    assert common_deviations(average_sizes("cylinders", 1.7), shown=False) is None  # pyright: ignore[reportArgumentType]
 
 
 def test_known_sizes_are_kept_and_the_person_is_looked_for_all_the_same():

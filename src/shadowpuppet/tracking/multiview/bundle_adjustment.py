@@ -53,41 +53,31 @@ class Bundle(Generic[Measured]):
 
 def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array, poses: Array, clouds: Sequence[Cloud],
                  settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float | Array = 1e-6, centre: Array | None = None,
-                 first: Measured | None = None, worth: float = INDEPENDENT_POINTS, together: Array | None = None) -> Bundle[Measured]:
+                 first: Measured | None = None, worth: float = INDEPENDENT_POINTS) -> Bundle[Measured]:
     """Sizes and poses that fit the surface points of F frames, by damped Gauss-Newton from poses (F, D) and sizes `first` or `expected`.
 
     `spread` (K,): standard deviations (m) of the expected sizes, 0 for fixed ones. `pull`, one or (F, D): weight of the squared distance
     from `centre` (F, D; default: `poses`), as in `Refiner.gauss_newton`. `worth`: effective number of independent points per frame.
-    `together` (C, K): deviations (m) of all sizes with one standard deviation of each of C common causes, such as the stature.
     """
     settings, start, about = settings or SurfaceSettings(), poses if centre is None else centre, expected.to_array()
     pull = np.broadcast_to(pull, poses.shape)
     free, scale = np.flatnonzero(spread > 0), worth / POINT_NOISE**2
-    apart = _precision(np.zeros((0, len(free))) if together is None else together[:, free] / spread[free])
-    tight = apart / np.outer(spread[free], spread[free]) / scale
     at, damping, best = ((about if first is None else first.to_array()), poses), 1e-2, None
     for turn in range(rounds + 1):
         body, nudged = make(type(expected).from_array(at[0])), _nudged(make, type(expected), at[0], free)
         model = _model(body)
         frames = [_equations(model, nudged, pose, cloud, settings) for pose, cloud in zip(at[1], clouds, strict=True)]
-        off = (at[0] - about)[free] / spread[free]
-        strain = apart @ off
-        cost = scale * (sum(frame.cost for frame in frames) + (pull * (at[1] - start) ** 2).sum()) + (off * strain).sum()
+        strain = (at[0] - about)[free] / spread[free]
+        cost = scale * (sum(frame.cost for frame in frames) + (pull * (at[1] - start) ** 2).sum()) + (strain**2).sum()
         better = best is None or cost < best.cost
         damping *= 0.3 if better else 8
         if best is None or better:
             best = _Solution(at, cost, frames, strain / spread[free], body)
         if turn < rounds:
-            at = _moved(best, free, tight, scale, start, pull, damping)
+            at = _moved(best, free, 1 / spread[free] ** 2 / scale, scale, start, pull, damping)
     assert best is not None
     residual = np.sqrt(np.mean([frame.squared for frame in best.frames]))
     return Bundle(type(expected).from_array(best.at[0]), best.at[1], float(residual))
-
-
-def _precision(together: Array) -> Array:
-    """Inverse covariance (K, K) of sizes in units of their own deviations, with those of common causes (C, K), in the same units."""
-    own = np.eye(together.shape[1])
-    return np.asarray(np.linalg.inv(own + together.T @ together), float) if len(together) else own
 
 
 class _Model(NamedTuple):
@@ -147,7 +137,7 @@ def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float,
            damping: float) -> tuple[Array, Array]:
     """Sizes and poses after a step: the poses are eliminated (Schur complement), the sizes solved for, the poses substituted back."""
     D, K = start.shape[1], len(free)
-    total, right, parts = tight * (1 + damping * np.eye(K)), -best.strain / scale, []
+    total, right, parts = np.diag(tight * (1 + damping)), -best.strain / scale, []
     for frame, pose, first, held in zip(best.frames, best.at[1], start, pull, strict=True):
         H, g = frame.rows.copy(), frame.gradient.copy()
         H[np.arange(D), np.arange(D)] += held

@@ -15,7 +15,7 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, stature_of
 from shadowpuppet.body.models import shares_of
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.sizes import HEIGHTS, AnatomicalSizes, BoneSizes
+from shadowpuppet.body.sizes import HEIGHTS, BoneSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
@@ -34,14 +34,6 @@ SIZES_FROM_JOINTS = (
 """Sizes that follow from the joints of training motion."""
 JOINT_DEVIATION = 0.001
 """Their standard deviation (m)."""
-STATURE_DEVIATION, GIRTH_DEVIATION, CLOTHES_DEVIATION = 0.03, 0.10, 0.015
-"""What sizes have in common: relative standard deviation of a stature told or seen, and of girths among people of one stature (ANSUR II,
-Gordon et al. 2014: some 8 to 12 %); and of the room that clothes take, across (m)."""
-GIRTHS = ("pelvis_width", "pelvis_depth", "waist_width", "waist_depth", "chest_width", "chest_depth", "shoulder_thickness", "neck_width",
-          "upper_arm_width", "elbow_width", "forearm_width", "wrist_width", "thigh_width", "knee_width", "calf_width", "ankle_width")
-CLOTHED = ("pelvis_width", "pelvis_depth", "waist_width", "waist_depth", "chest_width", "chest_depth", "upper_arm_width", "thigh_width",
-           "knee_width", "calf_width", "ankle_width")
-"""Widths that vary with a person's build, and those that clothes widen."""
 ROUNDS = 2
 """Number of rounds; each tracks the first frames, then solves for the sizes."""
 MAX_FRAMES, POINT_STRIDE = 24, 4
@@ -85,23 +77,12 @@ def size_deviations(sizes: BoneSizes, shown: bool) -> Array:
     return np.array([JOINT_DEVIATION if shown and name in SIZES_FROM_JOINTS else shares[name][1] * stature for name in sizes.names()])
 
 
-def common_deviations(sizes: BoneSizes, shown: bool) -> Array | None:
-    """Deviations (C, K), metres, of the sizes of an anatomical body with one standard deviation of each common cause: stature; girths, from
-    slim to stout; clothes. None for other bodies, and where joints have `shown` the bones: then each width is found well enough alone, and
-    widths that follow one another were no nearer on made recordings."""
-    if shown or not isinstance(sizes, AnatomicalSizes):
-        return None
-    names, values = sizes.names(), sizes.to_array()
-    return np.array([STATURE_DEVIATION * values, GIRTH_DEVIATION * values * np.isin(names, GIRTHS),
-                     CLOTHES_DEVIATION * np.isin(names, CLOTHED)])
-
-
 def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], expected: Measured, spread: Array, cameras: Sequence[Camera],
             first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], settings: MultiviewSettings,
-            library: Array | None = None, looks: int = 0, together: Array | None = None) -> SizeEstimate[Measured]:
+            library: Array | None = None, looks: int = 0) -> SizeEstimate[Measured]:
     """Sizes of the person in the `first` frames (surface points and masks, in order of time), `expected` with standard deviations `spread`
-    (K,) and common ones, `together` (C, K), as in `solve_bundle`. `looks`: number of frames after which what the body does not explain is
-    left out; 0: never. Raises `TrackingError` if no person is found."""
+    (K,). `looks`: number of frames after which what the body does not explain is left out; 0: never. Raises `TrackingError` if no person
+    is found."""
     plain, sizes, residual = replace(settings, method="hybrid", refinement="gauss_newton"), expected, np.nan
     for _ in range(ROUNDS if (spread > 0).any() else 0):
         tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
@@ -114,7 +95,7 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
         pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
         centre, pull = map(np.array, zip(*pulls, strict=True))
         bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
-                              worth=INDEPENDENT_POINTS[settings.body], together=together)
+                              worth=INDEPENDENT_POINTS[settings.body])
         sizes, residual = bundle.sizes, bundle.residual
     tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
     found = _followed(rng, tracker, first)
