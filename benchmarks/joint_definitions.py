@@ -1,9 +1,9 @@
-"""How much of a run's error is another definition of the joints: offsets from its joints to the truth's, constant in the limbs' frames.
+"""How much of a run's error is another definition of the joints: offsets of its joints from the truth's, constant in the limbs' frames.
 
     python benchmarks/joint_definitions.py RECORDING RUN [--pixels 5.6]
 
-A detector's knee, a mesh's and an anatomist's are points of the thigh some centimetres apart, whatever the pose. Each joint of the run is
-given the offset, constant in the segment that carries it (shoulders: the chest; elbows: the upper arm; hips: the pelvis; ...), that is best
+A detector's knee, a mesh's and an anatomist's are points of the thigh some centimetres apart, whatever the pose. Each joint of the run
+loses the offset, constant in the segment that carries it (shoulders: the chest; elbows: the upper arm; hips: the pelvis; ...), that is best
 in one half of the film, and the error is measured in the other half, and the other way round: an offset that does not stay is no
 definition. What it takes away no tracker can gain against that truth without learning its definition from it; what is left is tracking.
 
