@@ -72,6 +72,10 @@ FOUR, THREE = ("cam1", "cam3", "cam5", "cam7"), ("cam1", "cam3", "cam5")
 ROWS: dict[str, Row] = {
     "default": Row(),
     "default, no training motion": Row(training=False),
+    "default, cameras 1, 3, 5, 7": Row(cameras=FOUR),
+    "default, cameras 1, 3, 5, 7, no training motion": Row(cameras=FOUR, training=False),
+    "default, cameras 1, 3, 5": Row(cameras=THREE),
+    "default, cameras 1, 3, 5, no training motion": Row(cameras=THREE, training=False),
     "default, cameras 1, 3, 5, 7, exact masks": Row({"masks": True}, FOUR),
     "default, cameras 1, 3, 5, exact masks": Row({"masks": True}, THREE),
     "ni2008": Row({"preset": "ni2008"}),

@@ -26,6 +26,10 @@ import numpy as np
 import smallest
 from multiview import BUILD, made, measures
 
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.models import make_body
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.sizes import Sizes
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH
 from shadowpuppet.geometry import Array
@@ -48,6 +52,8 @@ ROWS: dict[str, dict[str, Any]] = {
     "no silhouettes": {"silhouettes": 0.0},
     "silhouettes / 4": {"silhouettes": 0.025},
     "no local search": {"local": 0},
+    "no training, height x 1.05": {"training": False, "height": 1.05},
+    "no training, sizes x 1.05": {"training": False, "sizes": 1.05},
     "no training, no local search": {"training": False, "local": 0},
     "any arms": {"arms": 0.0},
     "no training, any arms": {"training": False, "arms": 0.0},
@@ -71,7 +77,13 @@ ROWS: dict[str, dict[str, Any]] = {
     "half the rays": {"hull": {"rays": 1000}},
     "ni2008": {"preset": "ni2008"},
 }
-"""Each the default with something changed."""
+"""Each the default with something changed. `height` is a factor on the height that the recording tells, from which sizes are then measured;
+`sizes` one on all sizes measured, which stay so: what measuring is worth to a person of whom a wrong height is known."""
+
+
+def scaled(name: str, sizes: Sizes, factor: float) -> Body:
+    """A body of sizes that are all larger by a factor."""
+    return make_body(name, type(sizes).from_array(factor * sizes.to_array()))
 
 
 class Case:
@@ -102,14 +114,17 @@ class Case:
         """Measures of one row and seed."""
         values = dict(values)
         training, preset = values.pop("training", True), values.pop("preset", "default")
-        options = make_options({"preset": preset, "multiview": values})
+        taller, larger, told = values.pop("height", 1.0), values.pop("sizes", 1.0), self.rig.recording.subject.height
+        height = told if taller == 1 else taller * (told or AVERAGE_HEIGHT)
+        options = make_options({"preset": preset, "multiview": values, "height": height})
         settings = options.multiview
-        key = json.dumps([settings.body, training, seed])
+        key = json.dumps([settings.body, training, seed, taller])
         if key not in self.subjects:
             rig = self.rig if training else replace(self.rig, recording=replace(self.rig.recording, training=None))
             self.subjects[key] = fit_multiview(np.random.default_rng([seed, 0]), replace(self.survey, rig=rig), options)
         known = self.subjects[key].tracker
-        tracker = replace(known, settings=settings, prior=known.prior if settings.method == "hybrid" else None)
+        body = known.body if larger == 1 else scaled(settings.body, self.subjects[key].person.sizes, larger)
+        tracker = replace(known, body=body, settings=settings, prior=known.prior if settings.method == "hybrid" else None)
         masks = self.masks()
         if (at := repr(settings.hull)) not in self.hulls:
             hull, start = VisualHull(self.rig.cameras, settings.hull), time.process_time()
