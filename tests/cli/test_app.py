@@ -584,3 +584,14 @@ def test_plane_and_depth_are_those_of_the_runs_camera(shell, run, tmp_path):
     assert after["mean_mm"] == pytest.approx(before["mean_mm"])
     assert after["depth_mm"] < 0.9 * before["depth_mm"]
     assert after["plane_mm"] > before["plane_mm"]
+
+
+def test_the_speed_of_a_resumed_run_is_that_of_its_own_frames(monkeypatch):
+    clock = iter([0.0, 4.0])
+    monkeypatch.setattr(terminal_module, "monotonic", lambda: next(clock))
+    log = terminal_module._Log(SimpleNamespace(print=lambda *_, **__: None))
+    log.begin("tracking", 80)
+    log.stop()
+    for frame in range(61, 69):
+        log.advance(frame)
+    assert log._text() == "tracking 68/80, 2.0 a second, 4 s"

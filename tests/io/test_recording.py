@@ -12,6 +12,8 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, RecordingError, ShadowPuppetWarning, VideoError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.recording import POSTURES, Subject, is_recording, read_recording
+from shadowpuppet.pipeline.footage import open_recording
+from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.video import write_frames, write_image
 
 SIZE = (32, 24)
@@ -315,3 +317,17 @@ def test_a_misspelt_name_is_answered_with_the_one_that_is_there(tmp_path):
         read_recording(tmp_path / "mine.mpv")
     with pytest.raises(RecordingError, match=r"or a film$"):
         read_recording(tmp_path / "other.mov")
+
+
+def test_a_film_that_the_calibration_does_not_know_may_be_left_out(tmp_path):
+    lab = tmp_path / "lab"
+    lab.mkdir()
+    write_calibration(lab / "calibration.toml", cameras("a", "b"))
+    for name in ("a", "b", "c"):
+        film(lab / f"{name}.mp4")
+    with pytest.raises(RecordingError, match=r"lab: found c, but the calibration knows no such camera; .*--camera leaves films out"):
+        read_recording(lab)
+    assert [view.camera.name for view in read_recording(lab, asked=["a", "b"]).views] == ["a", "b"]
+    with pytest.raises(RecordingError, match="found c, but the calibration knows no such camera"):
+        read_recording(lab, asked=["a", "c"])
+    assert [view.camera.name for view in open_recording(lab, make_options({"camera": "b"})).views] == ["a", "b"]

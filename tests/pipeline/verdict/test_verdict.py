@@ -13,7 +13,7 @@ from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
 from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
 from shadowpuppet.pipeline.look import Look
-from shadowpuppet.pipeline.verdict.of_run import blind_frames, expected_error, lost_share, verdict_of_run
+from shadowpuppet.pipeline.verdict.of_run import _together, blind_frames, expected_error, lost_share, verdict_of_run
 from shadowpuppet.pipeline.verdict.verdict import verdict_of, verdict_of_look
 from shadowpuppet.silhouette.correction.condition import FilmCondition
 from shadowpuppet.silhouette.quality import MaskQuality
@@ -139,3 +139,9 @@ def test_frames_in_which_every_camera_was_blind_are_no_error_of_the_joints():
 def test_what_the_look_found_is_among_the_reasons():
     verdict = verdict_of_run(replace(LOOK, doubts=(caution(HARMFUL, "film is noisy: use more light"),)), motion(0.03, doubtful=2))
     assert verdict == ("doubtful", ("film is noisy: use more light", "left arm doubtful in 20 % of frames"))
+
+
+def test_arms_and_legs_take_one_reason_each():
+    shares = {"trunk": 0.2, "left_arm": 0.98, "right_arm": 0.91, "left_leg": 0.5, "right_leg": 0.504}
+    assert _together(["trunk", "left_arm", "right_arm"], shares) == [("both arms", 91.0, 98.0), ("trunk", 20.0, 20.0)]
+    assert [named for named, _, _ in _together(["left_leg", "right_leg", "left_arm"], shares)] == ["left arm", "both legs"]
