@@ -52,7 +52,7 @@ def blind_frames(motion: Motion, aside: Sequence[Mapping[str, Any]], cameras: in
     for one in aside:
         if one["why"] == "blind":
             blind[names.index(one["camera"])] |= (motion.times > one["from_s"] - ROUNDED) & (motion.times < one["to_s"] + ROUNDED)
-    return blind.all(0)
+    return np.logical_and.reduce(blind, 0)
 
 
 def expected_error(motion: Motion, blind: NDArray[np.bool_] | None = None) -> float:
