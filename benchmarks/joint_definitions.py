@@ -55,7 +55,7 @@ def without_offsets(delta: Array) -> tuple[Array, Array]:
 
 
 def off_by(recording: Recording, joints: JointTable, pixels: float) -> float:
-    """Size (m) of so many pixels at the person, the mean over cameras."""
+    """Size (m) at the person of a number of pixels, the mean over cameras."""
     middle = np.nanmean(joints.positions, axis=(0, 1))
     sizes = []
     for view in recording.views:

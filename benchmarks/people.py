@@ -36,7 +36,7 @@ from shadowpuppet.synthetic.spec_changes import SpecChanges, apply_changes
 COLUMNS = ("film", "people", "cameras", "count right, %", "longest ghost, s", "longest miss, s", "swaps", "errors, mm", "alone, mm",
            "uncertain, %", "silent, %", "sets/s")  # fmt: skip
 ALONE = {2: 1.5, 3: 2.0}
-"""Greatest error asked of each of so many people who walk round each other, over that of the same person alone."""
+"""Greatest error asked of each of two or three people who walk round each other, over that of the same person alone."""
 SEEN, HIDES = 0.9, 0.12
 """Share of a person's joints that two cameras must see for a miss to count; distance (m) from a line of sight within which another
 person's joint hides what is behind."""
@@ -171,7 +171,7 @@ def errors_alone(film: Film, folder: Path, options: Options) -> dict[str, float]
 
 
 def listed(errors: dict[str, float], people: int) -> str:
-    """The errors (mm) of so many people, by the names of their truths, in a line; empty if there are none."""
+    """The errors (mm) of a number of people, by the names of their truths, in a line; empty if there are none."""
     names = [f"truth_{n + 1}" for n in range(people)]
     return " ".join(f"{errors[name]:.0f}" if name in errors else "-" for name in names) if errors else ""
 

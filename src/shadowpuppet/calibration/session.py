@@ -34,7 +34,7 @@ DOUBT_FACTOR = 3.0
 MIN_DELAY = 0.15
 """Least delay of a film, frames, that is remarked on, if it is over `DOUBT_FACTOR` times its doubt."""
 MAX_DELAY = 0.5
-"""Delay of a film, frames, over which its pictures are taken anew at the times of the others': corners hardly move straight for longer."""
+"""Delay of a film, frames, over which its pictures are read again at the times of the others': corners hardly move straight for longer."""
 MIN_VIEW_ANGLE = np.radians(4.0)
 """Least angle between two cameras as the board sees them; with less, depth is hardly known."""
 

@@ -26,7 +26,7 @@ SAMPLES = 2
 BLUR = 0.5
 """Standard deviation of the picture's blur that is assumed, pixels."""
 ROUNDS, STEPS, SMALL_STEP = 3, 5, 0.003
-"""Rounds, after each of which corners still missing are predicted anew; steps of each corner, and the last one's length, pixels."""
+"""Rounds, after each of which corners still missing are predicted again; steps of each corner, and the last one's length, pixels."""
 MIN_LIKENESS = 0.8
 """Least correlation of print and picture around a corner: hands, glare and other boards are below."""
 MAX_MOVE = 0.3
