@@ -38,7 +38,7 @@ def test_a_picture_is_moved_back_as_by_plain_interpolation(turn, shift, bend, ch
     plain, inside = interpolated(image.astype(float), to_pixels @ movement @ np.linalg.inv(to_pixels))
     assert np.abs(back - plain)[inside > 0.1].max(initial=0) <= 0.06 * 510 + 1  # places are right to 0.03 pixels in each direction
     assert (back[inside < -0.1] == 0).all()
-    assert (inside[gap.unseen == 0] > -0.6).all()
+    assert (inside[gap.unseen == 0] > -1).all()  # the outline of the gap has whole pixels as corners
 
 
 @pytest.mark.parametrize("bend", [-2e-4, 5e-5, 1e-4, 2e-4])
