@@ -29,7 +29,7 @@ CALM_WEIGHT = 0.02
 """Weight in the person's colours of an enclosed pixel that is covered, against one that is passed over in all frames."""
 CALM_SHARE = 0.25
 """Least area of a part of such pixels over that of the largest."""
-VARIANT = 2.0
+VARIANT = 1.75
 """Distance of a mode from the scene's at the pixel, over a mode's radius, up to which it is the scene in another light, not the person."""
 PART_SHARE, PART_COLOUR = 0.02, 0.5
 """Least area of a covered part over that of the largest one, and least log ratio of its colours over the largest one's."""
