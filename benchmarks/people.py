@@ -1,4 +1,4 @@
-"""Several people before several cameras: are they counted, followed and told apart, and how much worse is each than alone?
+"""Several people before several cameras: are they counted, followed and not exchanged, and how much worse is each than alone?
 
     python benchmarks/people.py FOLDER [--films N ...] [--masks]
 

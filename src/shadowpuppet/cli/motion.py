@@ -102,12 +102,13 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
             listener.warn("osim is left out: only whole bodies have bones of constant lengths, as an OpenSim model needs")
         listener.begin("exporting")
         written = export_run(run, formats, folder, unit, missing, model, weight, rest, names)
-        verdict = read_run(one).metrics.get("verdict", {})
+        made = read_run(one)
+        verdict = made.metrics.get("verdict", {})
         if verdict.get("word") == "bad":
             why = "; ".join(verdict["reasons"])
             listener.warn(f"the verdict on this run is bad ({why}): look at its overlay before you use the motion")
     if not quiet:
-        level, whole = read_run(one).floor, read_run(one).motion.body_name in WHOLE
+        level, whole = made.floor, made.motion.body_name in WHOLE
         side = "below" if level < 0 else "above"
         where = "the lowest foot over the film is" if whole else "the feet are by the person's height"
         floor = f"{abs(level):.2f} m {side} the camera, where {where}; at 0 in these files"

@@ -30,6 +30,11 @@ def is_frozen(frames: int, seconds: float) -> bool:
     return frames >= FROZEN_FRAMES and seconds >= FROZEN_SECONDS
 
 
+def is_blind(mask: Mask | None) -> bool:
+    """Whether a camera sees nothing, as nearly all of its picture (H, W) is silhouette; not without a picture."""
+    return mask is not None and bool(mask.any()) and not may_be_person(mask)
+
+
 class Interval(NamedTuple):
     """When a camera was set aside."""
 
@@ -93,7 +98,7 @@ class CameraWatch:
                 self._still[n], self._since[n] = 0, seconds
             elif any(moved):
                 self._still[n] += 1
-        blind = [mask is not None and bool(mask.any()) and not may_be_person(mask) for mask in masks]
+        blind = [is_blind(mask) for mask in masks]
         frozen = [is_frozen(still, seconds - since) and not full for still, since, full in zip(self._still, self._since, blind)]
         self._last = [last if now is None else now for now, last in zip(masks, self._last)]
         if sum(mask is not None and not one and not other for mask, one, other in zip(masks, frozen, blind)) < LEAST:

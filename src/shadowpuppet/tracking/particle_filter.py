@@ -42,6 +42,11 @@ def evaluate(poses: Array, weigh: Weigh) -> Particles:
     return Particles(poses, *weigh(poses))
 
 
+def gathered(pose: Array, number: int) -> Particles:
+    """A number of particles, all in one pose (D,), with no costs yet."""
+    return Particles(np.repeat(pose[None], number, 0), *np.zeros((2, number)))
+
+
 def best_of(sets: Sequence[Particles], number: int) -> Particles:
     """The `number` particles of least cost in some sets, best first; repeated if there are fewer."""
     found = Particles(*(np.concatenate(values) for values in zip(*sets, strict=True)))

@@ -17,8 +17,8 @@ from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.people.evidence import Drawn
-from shadowpuppet.tracking.people.shared_sizes import Measure, at_pose
-from shadowpuppet.tracking.people.tracker import Share
+from shadowpuppet.tracking.people.shared_sizes import Measure
+from shadowpuppet.tracking.people.tracker import Share, at_pose
 
 LARGE = actor.sizes(thigh_length=1.1)
 POSE = actor.stance(actor.body().skeleton)

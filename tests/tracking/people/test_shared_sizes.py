@@ -14,8 +14,8 @@ from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.people.evidence import Drawn, draw_person
-from shadowpuppet.tracking.people.shared_sizes import at_pose, measure, shows
-from shadowpuppet.tracking.people.tracker import Share, shows_side
+from shadowpuppet.tracking.people.shared_sizes import measure, shows
+from shadowpuppet.tracking.people.tracker import Share, at_pose, shows_side
 
 GIRTHS = {"thigh_width": 1.25, "waist_width": 1.25, "pelvis_width": 1.25, "chest_width": 1.15}
 SETTINGS = MultiviewSettings(particles=6)

@@ -12,8 +12,7 @@ from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.people import tracker as module
 from shadowpuppet.tracking.people.evidence import Drawn, draw_person
-from shadowpuppet.tracking.people.shared_sizes import at_pose
-from shadowpuppet.tracking.people.tracker import Person, Share, keep_front, step, turn_round
+from shadowpuppet.tracking.people.tracker import Person, Share, at_pose, keep_front, step, turn_round
 
 POSE = actor.stance(actor.body().skeleton, 0.3, 0.2)
 HEADING = 3

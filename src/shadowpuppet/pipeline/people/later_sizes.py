@@ -15,8 +15,8 @@ from shadowpuppet.pipeline.people.member import Member, Shown
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.tracking.people.evidence import draw_person
 from shadowpuppet.tracking.people.facing import SETTLING
-from shadowpuppet.tracking.people.shared_sizes import Measure, at_pose, measure, shows
-from shadowpuppet.tracking.people.tracker import follow_turned, shows_side
+from shadowpuppet.tracking.people.shared_sizes import Measure, measure, shows
+from shadowpuppet.tracking.people.tracker import at_pose, follow_turned, shows_side
 
 SETS, SECONDS = 8, 1.4
 """Number of frames in which a person is measured, and the least time from the first to the last of them."""

@@ -22,9 +22,9 @@ from shadowpuppet.pipeline.people.group import Group
 from shadowpuppet.pipeline.people.member import Member
 from shadowpuppet.pipeline.subject import motion_frame
 from shadowpuppet.tracking.multiview.tracker import MultiviewState
+from shadowpuppet.tracking.particle_filter import gathered
 from shadowpuppet.tracking.people.evidence import Drawn, draw_person
 from shadowpuppet.tracking.people.facing import refitted
-from shadowpuppet.tracking.people.shared_sizes import at_pose
 from shadowpuppet.tracking.people.tracker import Person, Share, keep_front, observed, step
 from shadowpuppet.tracking.people.walking import TURN
 
@@ -102,7 +102,7 @@ def _doubted_since(member: Member, motion: Motion, until: float) -> float:
 
 
 def _joined(intervals: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Intervals of which none overlap or touch."""
+    """The same stretches of time as intervals that neither overlap nor touch, in order."""
     joined = list[tuple[float, float]]()
     for begin, end in sorted(intervals):
         if joined and begin <= joined[-1][1]:
@@ -144,12 +144,11 @@ def _start(member: Member, motion: Motion, until: float) -> MultiviewState | Non
     if not len(known):
         return None
     first = int(known[0])
-    resting = MultiviewState(motion.poses[first], 0 * motion.poses[first], None, float(motion.cost[first]),  # type: ignore[arg-type]
-                             float(motion.overlap[first]), "tracked")
-    state = at_pose(member.subject.tracker, resting, motion.poses[first].copy())
-    after = first + 1
+    pose, after = motion.poses[first].copy(), first + 1
     moving = after < len(motion) and bool(motion.known[after])
-    return state._replace(velocity=motion.poses[first] - motion.poses[after]) if moving else state
+    velocity = pose - motion.poses[after] if moving else np.zeros_like(pose)
+    particles = gathered(pose, member.subject.tracker.number)
+    return MultiviewState(pose, velocity, particles, float(motion.cost[first]), float(motion.overlap[first]), "tracked")
 
 
 def _followed_back(group: Group, motions: Mapping[int, Motion], number: int, state: MultiviewState, frames: Sequence[Packed]) -> Motion:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Bits
-from shadowpuppet.tracking.frozen import CameraWatch, Interval
+from shadowpuppet.tracking.frozen import CameraWatch, Interval, is_blind
 from shadowpuppet.tracking.multiview.out_of_step import StepWatch
 
 
@@ -26,7 +26,7 @@ class RigWatch:
         own: masks as each camera's own picture has them, where other cameras have added to `masks`. A frozen picture's stay alike.
         """
         if not self._many:
-            self._watch(seconds, masks)
+            self._watch.aside.note(seconds, ["blind" if is_blind(mask) else "" for mask in masks])
             return tuple(masks)
         kept = self._steps(seconds, self._watch(seconds, own or masks))
         return tuple(None if of_own is None else mask for of_own, mask in zip(kept, masks, strict=True))

@@ -18,8 +18,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
 from shadowpuppet.tracking.multiview.size_estimation import INDEPENDENT_POINTS, POINT_STRIDE, SIZE_PULL, size_deviations
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.tracking.particle_filter import Particles
-from shadowpuppet.tracking.people.tracker import Share, is_shown, observed
+from shadowpuppet.tracking.people.tracker import Share, at_pose, is_shown, observed
 
 CYCLES = 3
 """Number of estimation cycles in which poses are fitted to the silhouettes of a frame."""
@@ -69,9 +68,3 @@ def _fitted(rng: np.random.Generator, tracker: MultiviewTracker, share: Share, p
     for _ in range(CYCLES):
         state = single.cycle(rng, state, observation)
     return state
-
-
-def at_pose(tracker: MultiviewTracker, state: MultiviewState, pose: Array) -> MultiviewState:
-    """A state at rest in a pose (D,)."""
-    particles = Particles(np.repeat(pose[None], tracker.number, 0), *np.zeros((2, tracker.number)))
-    return state._replace(pose=pose, velocity=np.zeros_like(pose), particles=particles)

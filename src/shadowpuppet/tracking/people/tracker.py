@@ -17,7 +17,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.tracking.particle_filter import Particles
+from shadowpuppet.tracking.particle_filter import gathered
 from shadowpuppet.tracking.people.evidence import (
     Division,
     Drawn,
@@ -189,9 +189,12 @@ def _turned_round(person: MultiviewTracker, state: MultiviewState) -> MultiviewS
     skeleton = person.body.skeleton
     pose = state.pose[other_side(skeleton.dof_names)]
     pose[skeleton.dof_indices(GLOBAL_DOFS[3:])[0]] += np.pi
-    still = np.zeros_like(pose)
-    particles = Particles(np.repeat(pose[None], person.number, 0), *np.zeros((2, person.number)))
-    return state._replace(pose=pose, velocity=still, particles=particles)
+    return at_pose(person, state, pose)
+
+
+def at_pose(tracker: MultiviewTracker, state: MultiviewState, pose: Array) -> MultiviewState:
+    """A state at rest in a pose (D,)."""
+    return state._replace(pose=pose, velocity=np.zeros_like(pose), particles=gathered(pose, tracker.number))
 
 
 def touching(drawn: Mapping[int, Drawn]) -> list[int]:

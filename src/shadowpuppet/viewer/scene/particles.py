@@ -18,7 +18,7 @@ from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate
+from shadowpuppet.tracking.particle_filter import diffuse, evaluate, gathered
 from shadowpuppet.tracking.resampling import normalise
 from shadowpuppet.viewer.scene.scene import ParticleCloud, SceneCamera
 
@@ -74,9 +74,8 @@ class ParticleRerun:
         observation = MultiviewObservation(tracker.views, self._hull.points(masks), masks)
         if not tracker.is_present(observation):
             return None
-        still = np.zeros_like(before)
-        start = Particles(np.repeat(before[None], tracker.number, axis=0), np.zeros(tracker.number), np.zeros(tracker.number))
-        found = tracker.cycle(rng, MultiviewState(before, still, start, np.nan, 1.0, "tracked"), observation).particles
+        start = MultiviewState(before, np.zeros_like(before), gathered(before, tracker.number), np.nan, 1.0, "tracked")
+        found = tracker.cycle(rng, start, observation).particles
         weights = normalise(found.log_weights)
         return found.poses, weights / weights.max()
 
