@@ -58,6 +58,19 @@ def test_the_first_person_is_at_the_origin():
         assert (first.x, first.y) == (0, 0)
 
 
+@pytest.mark.parametrize("together", TOGETHER)
+@pytest.mark.parametrize("count", [2, 4])
+def test_cameras_stand_around_all_people(together, count):
+    spec = apply_changes(SpecChanges(people=count, together=together, cameras=5, seconds=4, rate=5), Spec())
+    cameras = [view.camera() for view in spec.views()]
+    pelvis = np.stack([joints[:, JOINTS.index("pelvis")] for joints in figures(spec)])  # (people, T, 3)
+    for camera in cameras:
+        pixels = camera.project(pelvis.reshape(-1, 3))
+        assert ((pixels >= 0) & (pixels < np.array(camera.size) - 1)).all(1).mean() > 0.95
+    placed = apply_changes(SpecChanges(people=count, together=together), Spec(ring=Ring(count=4, radius=6.0))).ring
+    assert placed == Ring(count=4, radius=6.0)  # a spec's own cameras stay
+
+
 def test_choices_of_the_command_line():
     spec = apply_changes(SpecChanges(people=3, cameras=5), Spec())
     assert len(spec.scene.bystanders) == 2

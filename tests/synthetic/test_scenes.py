@@ -110,6 +110,18 @@ def test_a_perfect_ring_is_evenly_spread_and_looks_at_the_middle(count, radius, 
             np.testing.assert_allclose(camera.project(middle), (np.array(camera.size) - 1) / 2, atol=1e-6)
 
 
+@given(ahead=st.floats(-2, 2), left=st.floats(-2, 2), start=st.floats(-180, 180))
+@settings(max_examples=30, deadline=None)
+def test_a_ring_may_be_about_another_place_than_the_persons(ahead, left, start):
+    ring = Ring(count=5, radius=4.5, start_deg=start, jitter=0)
+    views = replace(ring, ahead=ahead, left=left).views(1.75)
+    middle = np.array([left, -ahead, BODY_CENTRE * 1.75])
+    for view, about_person in zip(views, ring.views(1.75)):
+        camera = view.camera()
+        np.testing.assert_allclose(camera.centre[:2] - middle[:2], about_person.camera().centre[:2], atol=1e-9)
+        assert np.linalg.norm(camera.project(middle) - 0.5 * np.array(view.size)) < 0.03 * view.size[0]  # pitch and yaw are not of one axis
+
+
 @given(jitter=st.floats(0.05, 1), seed=st.integers(0, 1000))
 @settings(max_examples=30, deadline=None)
 def test_a_rings_cameras_stray_as_far_as_asked_and_no_farther(jitter, seed):

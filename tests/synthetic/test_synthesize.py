@@ -144,7 +144,7 @@ def test_a_made_recording_can_be_made_again_from_its_spec(tmp_path):
 @pytest.mark.parametrize(("text", "told"), [
     ("fog = 1", r"spec\.toml: fog: no such setting; possible are begin, body, cameras, faults, frames, motion"),
     ("[scene]\nfog = 1", r"scene\.fog: no such setting; possible are background, bystanders"),
-    ("[ring]\nnumber = 3", r"ring\.number: no such setting; possible are count, distortion"),
+    ("[ring]\nnumber = 3", r"ring\.number: no such setting; possible are ahead, count, distortion"),
     ("[[scene.obstacles]]\nkind = 'sofa'", r"scene\.obstacles\.0\.kind: .*'table', 'chair', 'pillar' or 'cabinet', found 'sofa'"),
     ("[[scene.obstacles]]\nkind = 'chair'\nwhere = 1", r"scene\.obstacles\.0\.where: no such setting; possible are ahead, colour"),
     ("[[scene.obstacles]]\nkind = 'chair'\nahead = 0.1", r"scene\.obstacles\.0: ahead, left: found 0.1, 0, where the person stands"),

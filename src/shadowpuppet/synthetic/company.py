@@ -7,6 +7,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from shadowpuppet.synthetic.movement.paths import TURN_RADIUS
+from shadowpuppet.synthetic.viewpoint import wrapped
 
 Together = Literal["round", "past", "dance", "shake_hands"]
 
@@ -48,7 +49,7 @@ def _round(count: int) -> list[Member]:
     radius = max(0.75, 0.3 * count)
     walk = {"motion": "walk", "path": "circle", "size": radius, "speed": 1.0}
     angles = 2 * np.pi * np.arange(count) / count  # of the headings; the circle's middle is to everybody's left
-    return [Member(walk, -radius * float(np.cos(angle)), -radius * float(np.sin(angle)), _half_open(float(np.degrees(angle))))
+    return [Member(walk, -radius * float(np.cos(angle)), -radius * float(np.sin(angle)), wrapped(float(np.degrees(angle))))
             for angle in angles]  # fmt: skip
 
 
@@ -65,7 +66,7 @@ def _dance(count: int) -> list[Member]:
     radius = max(0.65, 0.3 * count)
     angles = 2 * np.pi * np.arange(count) / count
     return [Member({"motion": DANCES[n % len(DANCES)]}, -radius * float(np.sin(angle)), radius * float(np.cos(angle)),
-                   _half_open(float(np.degrees(angle)))) for n, angle in enumerate(angles)]  # fmt: skip
+                   wrapped(float(np.degrees(angle)))) for n, angle in enumerate(angles)]  # fmt: skip
 
 
 def _shake_hands(count: int) -> list[Member]:
@@ -78,8 +79,3 @@ def _shake_hands(count: int) -> list[Member]:
         motion = {"motion": "wave_hands" if alone else "shake_hands"}
         people.append(Member(motion, x - aside if second else x, -distance if second else 0.0, 180.0 if second else 0.0))
     return people
-
-
-def _half_open(degrees: float) -> float:
-    """The same angle from -180 to below 180, degrees."""
-    return (degrees + 180) % 360 - 180

@@ -25,6 +25,8 @@ Progress = Callable[[int, int], None]
 
 REFERENCES = {"front_t_pose": LEVEL, "side_arms_hanging": HANGING_ARMS | trunk(turn=90), "front_arms_t_pose": LEVEL}
 """The postures of Liu 2011's initialisation (Algorithm 1): O1, O2, O3."""
+MIDDLE_RATE = 4.0
+"""Moments a second by which the floor that people cover is measured."""
 FAR_BELOW = 1e5
 """Place of an absent person, metres below the floor: less than a pixel, and no shadow."""
 
@@ -87,6 +89,15 @@ def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
                             f"{max(there, 0)}: then the motion is over")
     times = np.arange(spec.frames or there) / spec.rate
     return times, _figure(spec, times + spec.begin, rng)
+
+
+def covered_middle(spec: Spec) -> Array:
+    """The middle (2,) of the floor that all people cover, world, metres."""
+    slow, rng = replace(spec, rate=MIDDLE_RATE, frames=None), np.random.default_rng(spec.seed)
+    times, figure = perform(slow, rng)
+    figures = [figure, *(_bystander(slow, someone, len(times), rng, figure) for someone in spec.scene.bystanders)]
+    places = np.concatenate([each.joints[:, 0, :2] for each in figures])
+    return (places.min(0) + places.max(0)) / 2
 
 
 def feet_of(spec: Spec, times: Array, figure: Figure, rng: np.random.Generator) -> Soles:

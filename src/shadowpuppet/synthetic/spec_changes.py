@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -131,12 +131,22 @@ def apply_changes(changes: SpecChanges, spec: Spec, source: str = "flags") -> Sp
         values["scene"]["obstacles"] = [*others, chair]
     if "second_person" in said:
         values["scene"]["bystanders"] = [SECOND_PERSONS[said["second_person"]]]
-    return spec_from(values, source)
+    changed = spec_from(values, source)
+    return _around_all(changed) if said.get("around_all") else changed
+
+
+def _around_all(spec: Spec) -> Spec:
+    """The spec with its ring of cameras around the middle of the floor that all people cover."""
+    from shadowpuppet.synthetic.recording import covered_middle
+
+    assert spec.ring is not None
+    x, y = covered_middle(spec).round(3).tolist()
+    return replace(spec, ring=replace(spec.ring, ahead=-y, left=x))
 
 
 def _gather(values: dict[str, Any], said: dict[str, Any], spec: Spec, source: str) -> None:
     """Add people to a spec's plain values: the first person's motion unless --motion gives it, and bystanders. Cameras in a ring stand
-    back to see them all, unless they were placed."""
+    around all of them, and back to see them all, unless they were placed."""
     if "second_person" in said:
         raise SettingsError(f"{source}: found --second-person and --people or --together, expected one of them")
     count = said.get("people", 2)
@@ -153,6 +163,7 @@ def _gather(values: dict[str, Any], said: dict[str, Any], spec: Spec, source: st
     if "ring" not in values and said.get("cameras", 1) > 1:
         said.setdefault("ring_radius", RING_RADIUS + RING_RADIUS_EACH * (count - 2))
         said.setdefault("fov", RING_FOV)
+        said["around_all"] = True
 
 
 def parse_gestures(text: str, seconds: float | None = None, source: str = "motion") -> tuple[Gesture, ...]:

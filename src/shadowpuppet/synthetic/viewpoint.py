@@ -93,16 +93,20 @@ class Viewpoint:
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
 class Ring:
-    """Cameras evenly around the person, directed at their middle, with the irregularity of real rigs."""
+    """Cameras evenly around the person or another place, directed at its middle, with the irregularity of real rigs."""
 
     count: Annotated[int, Field(ge=2, le=64)] = 7
     """Number of cameras; their names are cam1, cam2, ..."""
     radius: Distance = 3.5
-    """Horizontal distance from the person's place, metres."""
+    """Horizontal distance from the ring's middle, metres."""
+    ahead: Annotated[float, Field(ge=-8, le=8)] = 0.0
+    """Distance of its middle in front of the person, metres; negative behind."""
+    left: Annotated[float, Field(ge=-8, le=8)] = 0.0
+    """Distance of its middle to the person's left, metres."""
     height: Height = 1.6
     """Height over the floor, metres."""
     start_deg: Angle = 0.0
-    """Direction from the person to the first camera, degrees: 0 in front of the person, 90 on their left; the others follow to the left."""
+    """Direction from the middle to the first camera, degrees: 0 in front of the person, 90 on their left; the others follow to the left."""
     jitter: Annotated[float, Field(ge=0, le=1)] = 0.3
     """Irregularity of place, direction and focal length: 0 a perfect ring; 1 up to 7 degrees, 25 cm, 7 % of the radius."""
     seed: Annotated[int, Field(ge=0)] = 1
@@ -130,11 +134,26 @@ class Ring:
             fov = float(np.clip(self.fov_deg * (1 + self.jitter * RING_SCALE_JITTER * rng.uniform(-1, 0)), 10, 170))
             height = float(np.clip(self.height + off["height"], 0.05, 6))
             down = np.degrees(np.arctan2(height - BODY_CENTRE * stature, distance)) + off["pitch_deg"]
-            azimuth = (self.start_deg + 360 * n / self.count + off["azimuth_deg"] + 180) % 360 - 180
-            views.append(Viewpoint(name=f"cam{n + 1}", size=self.size, fov_deg=fov, height=height, distance=distance,
-                                   azimuth_deg=float(azimuth), pitch_deg=float(np.clip(down, -60, 60)), yaw_deg=off["yaw_deg"],
-                                   roll_deg=off["roll_deg"], distortion=self.distortion, fisheye=self.fisheye))  # fmt: skip
+            direction = wrapped(self.start_deg + 360 * n / self.count + off["azimuth_deg"])
+            distance, azimuth = self._from_person(distance, direction)
+            yaw = float(np.clip(off["yaw_deg"] + wrapped(azimuth - direction), -60, 60))  # it looks at the middle, not at the person
+            views.append(Viewpoint(name=f"cam{n + 1}", size=self.size, fov_deg=fov, height=height, distance=distance, azimuth_deg=azimuth,
+                                   pitch_deg=float(np.clip(down, -60, 60)), yaw_deg=yaw, roll_deg=off["roll_deg"],
+                                   distortion=self.distortion, fisheye=self.fisheye))  # fmt: skip
         return tuple(views)
+
+    def _from_person(self, distance: float, direction: float) -> tuple[float, float]:
+        """Distance (m) and direction (degrees) from the person of a camera that is given by those from the middle."""
+        if not (self.ahead or self.left):
+            return distance, direction
+        left = self.left + distance * np.sin(np.radians(direction))
+        ahead = self.ahead + distance * np.cos(np.radians(direction))
+        return float(np.clip(np.hypot(left, ahead), 0.8, 20)), float(np.degrees(np.arctan2(left, ahead)))
+
+
+def wrapped(degrees: float) -> float:
+    """The same angle from -180 to below 180, degrees."""
+    return float((degrees + 180) % 360 - 180)
 
 
 def sees_everywhere(camera: Camera) -> bool:
