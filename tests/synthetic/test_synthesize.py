@@ -207,6 +207,7 @@ def test_gestures_without_seconds_share_what_is_left(lengths, spare):
     ("reach 4 5", None, r"motion: found 'reach 4 5', expected gestures and their seconds"),
     ("reach four", None, r"found 'reach four'"),
     ("reach,", None, r"found ''"),
+    ("reach 1.5", None, r"motion: found reach 1\.5, expected at least 2 seconds of each gesture"),
     ("reach 4", 10, r"seconds for every gesture and 10 for all"),
     ("reach 4, twist", 5, r"found 5 seconds, of which 1 gestures get 1 each, expected at least 2"),
     ("fly", None, r"motion\.0\.motion: .*found 'fly'"),

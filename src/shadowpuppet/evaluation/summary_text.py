@@ -13,9 +13,9 @@ from shadowpuppet.motion.motion import BLANK
 
 WAYS = {"none": "as they stand", "whole": "the whole run moved and turned once", "frame_offset": "each frame moved",
         "root": "from the {root}", "rigid": "each frame moved and turned", "similar": "each frame moved, turned and scaled (PA-MPJPE)"}
+"""The alignments of `error_metrics.aligned_errors`, in words."""
 OVERLAPS = {"good": 0.85, "fair": 0.7}
 """Least overlap of body and silhouette for each word; below that it is poor."""
-"""The alignments of `error_metrics.aligned_errors`, in words."""
 
 
 def root_text(aligned: Mapping[str, Any]) -> str:

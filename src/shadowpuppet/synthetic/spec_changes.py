@@ -15,7 +15,7 @@ from shadowpuppet.settings import STRICT
 from shadowpuppet.synthetic.company import RING_FOV, RING_RADIUS, RING_RADIUS_EACH, SEED, Together, members
 from shadowpuppet.synthetic.faults.fault import faults_from_text
 from shadowpuppet.synthetic.movement.resting import PostureName
-from shadowpuppet.synthetic.movement.script import Gesture
+from shadowpuppet.synthetic.movement.script import SHORTEST, Gesture
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
 from shadowpuppet.synthetic.walls import WallStyle
@@ -172,12 +172,14 @@ def parse_gestures(text: str, seconds: float | None = None, source: str = "motio
     for item in items:
         if not 1 <= len(item) <= 2 or (len(item) == 2 and not re.fullmatch(r"\d+(\.\d*)?", item[1])):
             raise SettingsError(f"{source}: found {' '.join(item)!r}, expected gestures and their seconds: name 4, name 5")
+    if short := next((item for item in items if len(item) == 2 and float(item[1]) < SHORTEST), None):
+        raise SettingsError(f"{source}: found {' '.join(short)}, expected at least {SHORTEST:g} seconds of each gesture")
     fixed, open_ = sum(float(item[1]) for item in items if len(item) == 2), sum(len(item) == 1 for item in items)
     if seconds is not None and not open_:
         raise SettingsError(f"{source}: found seconds for every gesture and {seconds:g} for all, expected one of them")
     each = 4.0 if seconds is None else (seconds - fixed) / open_ if open_ else 0.0
-    if open_ and each < 2:
-        raise SettingsError(f"{source}: found {seconds:g} seconds, of which {open_} gestures get {each:g} each, expected at least 2")
+    if open_ and each < SHORTEST:
+        raise SettingsError(f"{source}: found {seconds:g} seconds, of which {open_} gestures get {each:g} each, expected at least {SHORTEST:g}")
     values = [_named(item[0]) | {"seconds": float(item[1]) if len(item) == 2 else each} for item in items]
     return spec_from({"motion": values}, source).motion
 

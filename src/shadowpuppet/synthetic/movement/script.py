@@ -15,6 +15,8 @@ MotionName = Literal[
     "walk", "jog", "box", "lift", "squat", "sit", "march", "jump", "turn_around", "random_body", "mocap", "sit_down", "kneel",
     "shake_hands",
 ]  # fmt: skip
+SHORTEST = 2.0
+"""Least length of a gesture, seconds: it begins and ends at rest."""
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
@@ -23,7 +25,7 @@ class Gesture:
 
     motion: MotionName
     """Name: a gesture of arms and trunk, a whole-body action, `walk`, `jog`, or `mocap` from a file."""
-    seconds: Annotated[float, Field(ge=2, le=3600)] = 4.0
+    seconds: Annotated[float, Field(ge=SHORTEST, le=3600)] = 4.0
     """Length, seconds; at most that of the file."""
     speed: Annotated[float, Field(ge=0.4, le=5)] | None = None
     """Speed of walk (0.4 to 2.0) and jog (1.6 to 5), m/s; by default a comfortable one."""
