@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -49,6 +50,17 @@ def test_of_several_people_there_is_a_file_each(tmp_path, shell):
         found = read_motion(folder / "export" / f"pair-person-{n}.csv")
         alone = read_run(folder / f"person-{n}").motion
         assert found.times[0] == pytest.approx(alone.times[0], abs=1e-4)
+
+
+def test_of_several_people_each_bad_verdict_is_named(tmp_path, shell):
+    folder = runs.make_people(tmp_path / "pair")
+    file = folder / "person-2" / "metrics.json"
+    metrics = json.loads(file.read_text()) if file.exists() else {}
+    file.write_text(json.dumps(metrics | {"verdict": {"word": "bad", "reasons": ["the person is lost"]}}))
+    code, _, err = shell("export", str(folder), "--to", "csv")
+    assert code == 0, err
+    assert "verdict on this run of person 2 is bad (the person is lost)" in " ".join(err.split())
+    assert "person 1" not in err
 
 
 @pytest.fixture(scope="module", params=["rounded", "anatomical", "cylinders"])

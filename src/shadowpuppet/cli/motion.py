@@ -91,7 +91,8 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
     from shadowpuppet.io.people import person_folders
     from shadowpuppet.io.run import read_run
 
-    one = next(iter(person_folders(run).values()), run)
+    runs: dict[int | None, Path] = {**person_folders(run)} or {None: run}
+    one = next(iter(runs.values()))
     formats = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
     with terminal(quiet) as listener:
         if to == "all" and find_spec("pyarrow") is None:
@@ -103,10 +104,11 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
         listener.begin("exporting")
         written = export_run(run, formats, folder, unit, missing, model, weight, rest, names)
         made = read_run(one)
-        verdict = made.metrics.get("verdict", {})
-        if verdict.get("word") == "bad":
-            why = "; ".join(verdict["reasons"])
-            listener.warn(f"the verdict on this run is bad ({why}): look at its overlay before you use the motion")
+        for number, each in runs.items():
+            verdict = (made if each == one else read_run(each)).metrics.get("verdict", {})
+            if verdict.get("word") == "bad":
+                of, why = f" of person {number}" if number is not None else "", "; ".join(verdict["reasons"])
+                listener.warn(f"the verdict on this run{of} is bad ({why}): look at its overlay before you use the motion")
     if not quiet:
         level, whole = made.floor, made.motion.body_name in WHOLE
         side = "below" if level < 0 else "above"
