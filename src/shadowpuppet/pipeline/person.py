@@ -21,7 +21,7 @@ from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
 from shadowpuppet.motion.limbs import status_in_words
-from shadowpuppet.motion.motion import MotionFrame
+from shadowpuppet.motion.motion import Motion, MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, Footage
 from shadowpuppet.pipeline.look import Look, Survey
 from shadowpuppet.pipeline.options import Options
@@ -36,10 +36,11 @@ from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.tracking.doubt.monocular import Before, MonocularDoubt
 from shadowpuppet.tracking.doubt.steps import Trail
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
-from shadowpuppet.tracking.monocular.settings import MonocularSettings
+from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.tracking.particle_filter import Particles
+from shadowpuppet.tracking.smoothing.both_ways import blended
 from shadowpuppet.tracking.smoothing.facing import NEAR
 from shadowpuppet.tracking.smoothing.head_lean import head_lean
 from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
@@ -95,6 +96,10 @@ class MonocularSubject(TrackedSubject):
     def both_ways(self) -> bool:
         """Whether a film is tracked backward, too: an upper body's, if the settings say so."""
         return self.tracker.settings.both_ways and self.body.hem is not None
+
+    def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
+        """See `TrackedSubject`."""
+        return blended(forward, backward, self.joints, pixel_scale(self.picture.camera.size))
 
     def beside_in(self, masks: Sequence[Mask]) -> BesideBody | None:
         """What the body leaves unexplained in most of some masks (H, W), in the poses that fit each best; None if nothing is."""

@@ -107,6 +107,11 @@ class TrackedSubject(ABC):
         """Whether a film is tracked backward, too."""
         return False
 
+    def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
+        """Motions of the same frames that were tracked forward and backward as one, and the weight (T,) of the backward one; of subjects
+        that are tracked `both_ways`."""
+        raise NotImplementedError
+
     def left_out(self, state: Any) -> tuple[Mask | None, ...]:
         """For each camera the pixels (H, W) that a tracker's state leaves out of the silhouettes, in masks of any size; None for none."""
         return ()

@@ -47,9 +47,7 @@ from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, floor_entry, joint_names, motion_frame
 from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.tracking.monocular.settings import pixel_scale
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
-from shadowpuppet.tracking.smoothing.both_ways import blended
 from shadowpuppet.tracking.smoothing.butterworth import check_cutoff
 from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother, smoothed_parts
 from shadowpuppet.video import write_frames
@@ -97,7 +95,7 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         subject, store = prepared.check(), MaskStore()
         store = store if subject.both_ways and options.smoothing[0] != "off" else None
         leans = _track(writer, prepared, kind, options, listener, for_track, cache, store)
-        motion = writer.motion if store is None else _backward(writer, subject, rig, options, listener, store)
+        motion = writer.motion if store is None else _backward(writer, subject, options, listener, store)
         smooth_run(writer, [(0, subject)], options, listener, motion, leans)
         writer.info |= floor_entry(writer.motion, rig.cameras, prepared.check().person)
     written = read_run(folder)
@@ -163,7 +161,7 @@ def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]]
     writer.metrics["smooth_s"] = round(time.perf_counter() - start, 3)
 
 
-def _backward(writer: RunWriter, subject: TrackedSubject, rig: Rig, options: Options, listener: Listener, store: MaskStore) -> Motion:
+def _backward(writer: RunWriter, subject: TrackedSubject, options: Options, listener: Listener, store: MaskStore) -> Motion:
     """The run's motion blended with that of the same silhouettes tracked backward; as it is if they were too many to be kept."""
     motion, frames = writer.motion, list[MotionFrame]()
     if len(store.sets) != len(motion):
@@ -180,7 +178,7 @@ def _backward(writer: RunWriter, subject: TrackedSubject, rig: Rig, options: Opt
     builder = MotionBuilder(motion.body_name, motion.dof_names, motion.joint_names)
     for found in reversed(frames):
         builder.append(found)
-    both, share = blended(motion, builder.build(), subject.joints, pixel_scale(rig.cameras[0].size))
+    both, share = subject.blended(motion, builder.build())
     writer.replace_modes({found.time: found.modes for found, weight in zip(reversed(frames), share) if weight > 0.5})
     writer.metrics["backward_s"] = round(time.perf_counter() - start, 3)
     return both

@@ -179,7 +179,8 @@ def parse_gestures(text: str, seconds: float | None = None, source: str = "motio
         raise SettingsError(f"{source}: found seconds for every gesture and {seconds:g} for all, expected one of them")
     each = 4.0 if seconds is None else (seconds - fixed) / open_ if open_ else 0.0
     if open_ and each < SHORTEST:
-        raise SettingsError(f"{source}: found {seconds:g} seconds, of which {open_} gestures get {each:g} each, expected at least {SHORTEST:g}")
+        raise SettingsError(f"{source}: found {seconds:g} seconds, of which {open_} gestures get {each:g} each, expected at least "
+                            f"{SHORTEST:g}")
     values = [_named(item[0]) | {"seconds": float(item[1]) if len(item) == 2 else each} for item in items]
     return spec_from({"motion": values}, source).motion
 
