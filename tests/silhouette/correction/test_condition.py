@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from shadowpuppet.errors import HARMFUL, RUINOUS
 from shadowpuppet.silhouette import learn_background
 from shadowpuppet.silhouette.correction.condition import FilmCondition, film_condition
 
@@ -50,18 +51,24 @@ def test_a_good_film_is_not_accused():
     (lambda n, empty: shifted(empty, 6, 3) if n >= 12 else empty, 1.5, "from where it saw the empty scene, from about 3.0 s on"),
     (lambda n, empty: shifted(empty, 5, 3), 1.5, "from where it saw the empty scene, throughout"),
     (lambda n, empty: shifted(empty, 4 * (n % 3 - 1), 0) if n < 19 else empty, 1.5, "the camera moves by up to"),
-    (lambda n, empty: 255 - empty if n < 4 else empty, 1.5, "20 % of the frames do not show the empty scene"),
+    (lambda n, empty: 255 - empty if n < 11 else empty, 1.5, "55 % of the frames do not show the empty scene"),
+    (lambda n, empty: 255 - empty if n < 4 else empty, 1.5, "covered, black or moved"),
     (lambda n, empty: 0.5 * empty, 1.5, "the film's light is 0.50 to"),
     (lambda n, empty: empty, 30, "the film is noisy"),
-], ids=["nudged", "away", "shaking", "another place", "dark", "noisy"])
+], ids=["nudged", "away", "shaking", "another place", "covered", "dark", "noisy"])
 def test_what_is_too_much_is_named(spoil, noise, said):
     warnings = condition(spoil, noise).warnings()
     assert len(warnings) == 1
     assert said in warnings[0]
 
 
+@pytest.mark.parametrize(("frames", "weight"), [(4, HARMFUL), (15, RUINOUS)])
+def test_a_camera_that_is_covered_for_a_time_does_not_ruin_a_film(frames, weight):
+    assert condition(lambda n, empty: 0 * empty if n < frames else empty).warnings()[0].weight == weight
+
+
 @pytest.mark.parametrize("spoil", [
-    lambda n, empty: 255 - empty if n < 4 else empty,
+    lambda n, empty: 255 - empty if n < 15 else empty,
     lambda n, empty: empty + cv2.resize(np.random.default_rng(1).normal(0, 14, (24, 32, 3)), (160, 120)),
 ], ids=["another place", "light"])
 def test_nobody_is_told_to_film_again_what_was_never_filmed(spoil):

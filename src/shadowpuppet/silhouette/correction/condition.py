@@ -23,6 +23,7 @@ WARN_ERROR = 3.0
 WARN_COMPRESSION = 1.6
 WARN_GAIN = 1.5
 WARN_UNMATCHED = 0.02
+UNMATCHED_MOSTLY = 0.5
 WARN_BLUR = 0.6
 BLURRED = 0.3
 """Share of mixtures in fast limbs from which on a film counts as blurred by motion; short exposures have at most 0.26."""
@@ -83,6 +84,10 @@ class FilmCondition:
             yield Caution(f"{100 * self.unmatched:.0f} % of the frames do not fit the empty scene that was recovered from the film: the "
                           "person hides too much of it, or the camera moves; film it without the person, and step back",
                           "empty scene cannot be told from the film: film it", RUINOUS)
+        elif WARN_UNMATCHED < self.unmatched < UNMATCHED_MOSTLY:
+            yield Caution(f"{100 * self.unmatched:.0f} % of the frames do not show the empty scene: the camera was covered, black or moved "
+                          "by over a tenth of the picture for that time; look at the film, and cut it there",
+                          f"camera covered or moved in {100 * self.unmatched:.0f} % of frames: cut them", HARMFUL)
         elif self.unmatched > WARN_UNMATCHED:
             yield Caution(f"{100 * self.unmatched:.0f} % of the frames do not show the empty scene: the camera was moved by over a tenth "
                           "of the picture, is covered, or films another place; take the empty scene again",
