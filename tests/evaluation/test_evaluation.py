@@ -109,6 +109,8 @@ def test_without_a_truth_what_needs_none_is_shown(shell, tmp_path):
     assert (code, err) == (0, "")
     assert "30 frames (16.7 %) in 1 gaps; the longest 30 frames, 1.03 s, from 1.00 s" in " ".join(out.split())
     assert "joint errors" not in out
+    assert "truth" in out
+    assert "none is known: nothing is compared" in " ".join(out.split())
     measured = json.loads(shell("run", "--json")[1])
     assert measured["truth"] is None
     assert "errors" not in measured

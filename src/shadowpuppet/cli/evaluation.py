@@ -147,6 +147,7 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if gait := gait_text(measured["gait"]):
         yield "gait", gait
     if "errors" not in measured:
+        yield "truth", "none is known: nothing is compared; name a file of joints, .csv, .trc, .c3d, .bvh or .amc"
         return
     yield "clock", clock_text(measured["clock"])
     if measured["world"]:

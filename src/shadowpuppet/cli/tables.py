@@ -107,7 +107,7 @@ def metrics_table(metrics: Mapping[str, Any]) -> RenderableType:
     rows: list[tuple[str, str | None]] = [
         ("frames", f"{metrics['frames']}: {statuses}" if statuses else "none"),
         ("doubt", doubt_text(metrics)),
-        ("legs", "not tracked; --body anatomical tracks them where the film shows them" if _lacks_legs(metrics) else None),
+        ("legs", "not tracked; --body anatomical tracks them, with much doubt, if feet are seen" if _lacks_legs(metrics) else None),
         ("overlap", f"{overlap['mean']:.3f}, {overlap_sense(overlap['mean'])} (IoU of body and silhouette; p5 {overlap['p5']:.3f})"
                     if overlap["count"] else None),
         ("cost", f"{scale * cost['mean']:.{digits}f} {unit} (p95 {scale * cost['p95']:.{digits}f})" if cost["count"]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, choices
+from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, choices, warn
 from shadowpuppet.io.recording import Recording, View, differ_by_padding, read_recording
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video import FrameSource, Image, camera_number, fitted, open_frames
@@ -149,6 +149,8 @@ def cut(recording: Recording, options: Options) -> Recording:
     lengths = [(film.count / film.rate if film.count else film.duration) - view.start for film, view in zip(films, views)]
     length = min(max((each for each in lengths if np.isfinite(each)), default=np.inf), recording.duration or np.inf)
     begin, end = span_of(options.start, options.end, rate, length)
+    if np.isfinite(end) and end > length + 1 / (rate if np.isfinite(rate) else np.inf):
+        warn(f"{recording.path}: end: found {options.end}, {end:g} s; the film ends at {length:.1f} s")
     end = min(end, recording.duration or np.inf)
     return replace(recording, begin=begin, duration=end if np.isfinite(end) else None, whole=recording)
 

@@ -116,5 +116,7 @@ def test_check_as_a_user_types_it(recording, again, cameras, capsys, tmp_path):
     assert "no such recording" in capsys.readouterr().err
     assert run(["check", str(recording / "calibration.toml")]) == 2
     assert "is a calibration, expected a recording with films" in capsys.readouterr().err
+    assert run(["check", str(next(path for path in (recording / "video").iterdir()))]) == 2
+    assert "found one film, expected the folder of a recording of two cameras or more" in " ".join(capsys.readouterr().err.split())
     assert run(["check", str(recording), "--camera", "cam1"]) == 2
     assert "found one camera, expected two or more" in capsys.readouterr().err

@@ -37,6 +37,8 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
 
     if recording.is_file() and is_explained(recording):
         raise RecordingError(f"{recording}: is a calibration, expected a recording with films to test it on; `info` explains it")
+    if recording.is_file():
+        raise RecordingError(f"{recording}: found one film, expected the folder of a recording of two cameras or more")
     options = options_from(flags, config)
     with terminal(quiet=as_json) as listener:
         rig = open_rig(recording, options)

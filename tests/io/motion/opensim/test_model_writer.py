@@ -116,7 +116,7 @@ def test_a_person_of_average_build_weighs_what_one_does(tmp_path):
 
 
 def test_an_upper_body_is_said_to_have_no_model(tmp_path):
-    with pytest.raises(ShadowPuppetError, match=r"a\.osim: found the body 'rounded', expected a whole body"):
+    with pytest.raises(ShadowPuppetError, match=r"a\.osim: found an upper body \(rounded\), expected a whole body"):
         write_osim(tmp_path / "a.osim", runs.body_of("rounded"), moving(tmp_path, "rounded"))
 
 

@@ -46,7 +46,8 @@ def write_osim(path: str | Path, body: Body, animation: Animation, weight: float
     """
     path = Path(path)
     if animation.names[0] != "pelvis" or "right_hip" not in animation.names or body.limbs is None:
-        raise ShadowPuppetError(f"{path}: found the body {body.name!r}, expected a whole body: only these have bones of constant lengths")
+        raise ShadowPuppetError(f"{path}: found an upper body ({body.name}), expected a whole body, as an OpenSim model needs: --body "
+                                "anatomical")
     parts: dict[str, list[Part]] = {}
     for part in MODELS["own"].parts:
         if part.joint in animation.names and _moves(body, part.joint):
