@@ -16,6 +16,7 @@ from shadowpuppet.camera.rasterize import Picture, count, pack
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular import pose_search
 from shadowpuppet.tracking.monocular.extended_stage import make_stage
+from shadowpuppet.tracking.monocular.leg_postures import floor_below
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.stages import FilterStage
 from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate, step
@@ -167,4 +168,5 @@ class MonocularTracker:
         """The filter's stages, in order; a whole body's legs that are not among them are added at the end."""
         named, limbs = self.settings.stages, limbs_of(self.picture.body.skeleton)
         legs = [limb for limb in limbs if limb.endswith("leg") and not any(limb in name for name in named)]
-        return tuple(make_stage(self.picture, self.settings, name, self.scheme) for name in (*named, *legs))
+        floor = floor_below(self.picture)
+        return tuple(make_stage(self.picture, self.settings, name, self.scheme, floor) for name in (*named, *legs))
