@@ -28,6 +28,9 @@ ABOVE_FLOOR, BELOW_FEET = 0.05, 0.15
 """Least height of the hips over the floor, metres; and how far below the straight legs' soles a floor may be that is the person's."""
 FLOOR_WEIGHT = 5000.0
 """Cost of a point of the feet or a knee below the floor (pixels per m^2, at 320 x 240)."""
+CONTACT_WEIGHT, REACH = 20000.0, 0.15
+"""Cost of the body's lowest point off the floor, where the person's place is looked for, in the same unit; and the distance (m) at which it
+no longer grows much."""
 
 
 def posture_penalty(skeleton: Skeleton, poses: Array) -> Array:
@@ -71,8 +74,25 @@ def floor_below(picture: Picture) -> float | None:
     return 0.0 if ankles - BELOW_FEET <= 0 <= hips - ABOVE_FLOOR else None
 
 
+def contact_cost(picture: Picture, level: float, weight: float) -> Cost:
+    """The cost (N,) of poses (N, D) whose lowest point is above or below a floor at a height `level` (m) in the world; `weight`: per m^2.
+    It is bounded: a person may jump, or sit with hanging feet."""
+    names = _lowest(picture)
+
+    def cost(poses: Array) -> Array:
+        squared = (picture.points_world(poses, names)[..., 2].min(1) - level) ** 2
+        return weight * squared / (1 + squared / REACH**2)
+
+    return cost
+
+
 def floor_cost(picture: Picture, level: float, weight: float) -> Cost:
     """The cost (N,) of poses (N, D) whose feet or knees are below a floor at a height `level` (m) in the world; `weight`: per m^2."""
-    known = picture.body.landmark_names
-    names = [f"{side}_{name}" for side in ("left", "right") for name in ("heel", "toe", "ankle", "knee") if f"{side}_{name}" in known]
+    names = _lowest(picture)
     return lambda poses: weight * (np.minimum(picture.points_world(poses, names)[..., 2] - level, 0) ** 2).sum(1)
+
+
+def _lowest(picture: Picture) -> list[str]:
+    """Names of the landmarks that may be on the floor."""
+    known = picture.body.landmark_names
+    return [f"{side}_{name}" for side in ("left", "right") for name in ("heel", "toe", "ankle", "knee") if f"{side}_{name}" in known]

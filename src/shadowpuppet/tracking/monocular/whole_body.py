@@ -15,15 +15,13 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array, inverse, transform
 from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
+from shadowpuppet.tracking.monocular.whole_distance import whole_distance
 from shadowpuppet.tracking.silhouette_cost import Observation
 
 CUT_OFF_ROWS = 2
 """A silhouette that reaches this many last rows of the picture is cut off there."""
 DISTANCE_FACTORS = np.arange(0.8, 1.5, 0.01)
 """Distances that are tried, relative to that of the upper body."""
-UPRIGHT = 0.12
-"""Relative difference of the distances by the soles and by the upper body above which the person does not stand: whoever sits or kneels
-shows only some three quarters of a standing person's height."""
 WIDTH_FACTORS = np.arange(0.75, 1.61, 0.05)
 """Factors on widths that are tried."""
 WIDEST = 2
@@ -48,14 +46,17 @@ def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEsti
     made = make_body(body, whole)
     neck = made.points(made.skeleton.pose()[None], names=["neck"])[0, 0, 2]
     estimate = replace(upper, sizes=whole, elevation=upper.elevation + found.torso_height - neck)
+    if distance is None and not standing:
+        def at(factor: float) -> PersonEstimate:
+            there = _at_distance(estimate, factor, neck)
+            return there if sizes is not None else _with_clothes(camera, masks, there, whole, body)
+
+        return at(whole_distance(camera, masks, body, at))
     soles = np.array([np.flatnonzero(mask.any(1))[-1] for mask in masks if not mask[-CUT_OFF_ROWS:].any()])
     if distance is None and len(soles):
         candidates = [_at_distance(estimate, factor, neck) for factor in DISTANCE_FACTORS]
         rows = np.array([_soles_row(each.picture(camera, body), whole) for each in candidates])
-        factors = DISTANCE_FACTORS[np.abs(rows - soles[:, None]).argmin(1)]
-        soles = soles[standing | (np.abs(factors - 1) <= UPRIGHT)]
-        if len(soles):
-            estimate = candidates[int(np.argmin(np.abs(rows - np.median(soles))))]
+        estimate = candidates[int(np.argmin(np.abs(rows - np.median(soles))))]
     return estimate if sizes is not None else _with_clothes(camera, masks, estimate, whole, body)
 
 
