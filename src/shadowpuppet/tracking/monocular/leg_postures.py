@@ -20,7 +20,7 @@ USUAL = np.radians([(50, 70, -15), (88, 90, 0), (110, 120, -25), (0, 90, 55)])
 """Flexion of hip, knee and ankle (upward negative) of usual legs besides standing ones, rad: half a squat, seated, a squat, kneeling."""
 SPREAD = np.radians((25, 25, 20))
 """Their standard deviations."""
-RARER = 1.0
+RARER = np.array([1.0, 1.0, 2.0, 2.0])
 """What they cost more than standing, in squared deviations."""
 BOUND = 9.0
 """Bound of a DOF's squared deviation, as of `Skeleton.posture_penalty`."""
@@ -47,7 +47,7 @@ def posture_penalty(skeleton: Skeleton, poses: Array) -> Array:
         dofs, (usual, spread) = dofs_of(skeleton, leg), _usual(skeleton, leg)
         standing = bounded[:, dofs].sum(1)
         other = ((poses[:, None, dofs] - usual) / spread) ** 2
-        total += np.minimum(RARER + (other / (1 + other / BOUND)).sum(2).min(1) - standing, 0)
+        total += np.minimum((RARER + (other / (1 + other / BOUND)).sum(2)).min(1) - standing, 0)
     return total
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array, inverse, transform
 from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
-from shadowpuppet.tracking.monocular.whole_distance import whole_distance
+from shadowpuppet.tracking.monocular.whole_distance import whole_distance, whole_poses
 from shadowpuppet.tracking.silhouette_cost import Observation
 
 CUT_OFF_ROWS = 2
@@ -24,8 +24,8 @@ DISTANCE_FACTORS = np.arange(0.8, 1.5, 0.01)
 """Distances that are tried, relative to that of the upper body."""
 WIDTH_FACTORS = np.arange(0.75, 1.61, 0.05)
 """Factors on widths that are tried."""
-WIDEST = 2
-"""Number of the widest silhouettes in which widths are fitted."""
+WIDEST, REFITS = 3, 2
+"""Number of the widest silhouettes in which widths are fitted, and how often they are fitted again in whole poses."""
 WIDTH_GROUPS = (
     ("pelvis_width", "waist_width", "chest_width", "trunk_width"),
     ("thigh_width", "knee_width", "calf_width", "ankle_width", "shank_width"),
@@ -46,18 +46,25 @@ def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEsti
     made = make_body(body, whole)
     neck = made.points(made.skeleton.pose()[None], names=["neck"])[0, 0, 2]
     estimate = replace(upper, sizes=whole, elevation=upper.elevation + found.torso_height - neck)
+
+    def refitted(there: PersonEstimate) -> PersonEstimate:
+        """With the widths of least cost in whole poses: straight legs in place of bent ones would make them too thin."""
+        for _ in range(0 if sizes is not None or standing else REFITS):
+            there = _with_clothes(camera, masks, there, whole, body, whole_poses)
+        return there
+
     if distance is None and not standing:
         def at(factor: float) -> PersonEstimate:
             there = _at_distance(estimate, factor, neck)
             return there if sizes is not None else _with_clothes(camera, masks, there, whole, body)
 
-        return at(whole_distance(camera, masks, body, at))
+        return refitted(at(whole_distance(camera, masks, body, at)))
     soles = np.array([np.flatnonzero(mask.any(1))[-1] for mask in masks if not mask[-CUT_OFF_ROWS:].any()])
     if distance is None and len(soles):
         candidates = [_at_distance(estimate, factor, neck) for factor in DISTANCE_FACTORS]
         rows = np.array([_soles_row(each.picture(camera, body), whole) for each in candidates])
         estimate = candidates[int(np.argmin(np.abs(rows - np.median(soles))))]
-    return estimate if sizes is not None else _with_clothes(camera, masks, estimate, whole, body)
+    return estimate if sizes is not None else refitted(_with_clothes(camera, masks, estimate, whole, body))
 
 
 def _at_distance(estimate: PersonEstimate, factor: float, neck: float) -> PersonEstimate:
@@ -72,16 +79,22 @@ def _soles_row(picture: Picture, sizes: BoneSizes) -> float:
     return float(camera.project(transform(inverse(camera.T_camera_world), soles))[:, 1].mean())
 
 
-def _with_clothes(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, sizes: BoneSizes, body: str) -> PersonEstimate:
+def _with_clothes(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, sizes: BoneSizes, body: str,
+                  search: Callable[[Camera, Sequence[Mask], str, PersonEstimate], Array] | None = None) -> PersonEstimate:
     """The estimate with the widths of least silhouette cost, in poses that are searched once; in the widest silhouettes, whose arms are off
-    the trunk: it would grow over hanging ones."""
+    the trunk: it would grow over hanging ones. `search`: finds the poses; without it they are coarse ones."""
     widest = sorted(masks, key=lambda mask: int(np.ptp(np.flatnonzero(mask.any(0)))))[-WIDEST:]
-    poses = [search_pose(estimate.picture(camera, body), mask).pose for mask in widest]
+    poses = list((search or _coarse_poses)(camera, widest, body, estimate))
     for names in WIDTH_GROUPS:
         widths = {name: getattr(sizes, name) for name in names if name in sizes.names()}
         tried = [sizes.with_values(**{name: factor * width for name, width in widths.items()}) for factor in WIDTH_FACTORS]
         sizes = tried[int(np.argmin([_silhouette_cost(camera, widest, poses, replace(estimate, sizes=each), body) for each in tried]))]
     return replace(estimate, sizes=sizes)
+
+
+def _coarse_poses(camera: Camera, masks: Sequence[Mask], body: str, estimate: PersonEstimate) -> Array:
+    picture = estimate.picture(camera, body)
+    return np.array([search_pose(picture, mask).pose for mask in masks])
 
 
 def _silhouette_cost(camera: Camera, masks: Sequence[Mask], poses: Sequence[Array], estimate: PersonEstimate, body: str) -> float:

@@ -14,10 +14,10 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, evenly_spread
-from shadowpuppet.tracking.monocular.leg_postures import CONTACT_WEIGHT, FLOOR_WEIGHT, contact_cost, floor_below, floor_cost, posture_penalty
+from shadowpuppet.tracking.monocular.leg_postures import CONTACT_WEIGHT, contact_cost, floor_below
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
-from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 
 STEP, STEPS = 1.08, 4
 """Ratio of one tried distance to the one before, and how many are tried nearer and farther than the upper body's."""
@@ -58,21 +58,26 @@ def _vertex(factors: Array, costs: Array) -> float:
 
 def _cost(camera: Camera, masks: Sequence[Mask], body: str, estimate: PersonEstimate, factor: float) -> float:
     """Mean cost of the poses found in masks (H, W), pixels at 320 x 240."""
-    picture, scale, settings = estimate.picture(camera, body), pixel_scale(camera.size), _settings(body)
-    floor, skeleton = floor_below(picture), picture.body.skeleton
-    tracker, total = MonocularTracker(picture, settings), 0.0
-    for k, mask in enumerate(masks):
-        state = tracker.start(np.random.default_rng(k), mask)
+    tracker, scale = _tracker(camera, body, estimate), pixel_scale(camera.size)
+    floor, total = floor_below(tracker.picture), 0.0
+    for state in _started(tracker, masks):
         if state.status == "absent":
             return np.inf
-        pose = state.pose[None]
-        total += state.cost / scale + settings.posture_weight * float(posture_penalty(skeleton, pose)[0])
-        if floor is not None:
-            total += float(floor_cost(picture, floor, FLOOR_WEIGHT)(pose)[0] + contact_cost(picture, floor, CONTACT_WEIGHT)(pose)[0])
+        total += tracker.misfit(state) / scale
+        total += 0.0 if floor is None else float(contact_cost(tracker.picture, floor, CONTACT_WEIGHT)(state.pose[None])[0])
     return total / len(masks) + WEIGHT * (np.log(factor) / DOUBT) ** 2
 
 
-def _settings(body: str) -> MonocularSettings:
-    settings = MonocularSettings(body=body)
+def whole_poses(camera: Camera, masks: Sequence[Mask], body: str, estimate: PersonEstimate) -> Array:
+    """Whole poses (K, D) searched for in masks (H, W), each by itself."""
+    return np.array([state.pose for state in _started(_tracker(camera, body, estimate), masks)])
+
+
+def _started(tracker: MonocularTracker, masks: Sequence[Mask]) -> list[State]:
+    return [tracker.start(np.random.default_rng(k), mask) for k, mask in enumerate(masks)]
+
+
+def _tracker(camera: Camera, body: str, estimate: PersonEstimate) -> MonocularTracker:
+    settings = MonocularSettings(body=body, explore=PARTICLES)
     parts = {name: replace(getattr(settings, name), particles=PARTICLES) for name in ("torso", "arm")}
-    return replace(settings, explore=PARTICLES, **parts)
+    return MonocularTracker(estimate.picture(camera, body), replace(settings, **parts))
