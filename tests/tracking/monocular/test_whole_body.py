@@ -81,7 +81,7 @@ def test_who_kneels_is_not_taken_for_far_away(name):
     mask = view.mask(pose)
     assert not mask[-2:].any()
     seated, standing = (whole_from_estimate(CAMERA, [mask], upper_of(view), name, standing=known) for known in (False, True))
-    assert seated.distance == FAR
+    assert seated.distance == pytest.approx(FAR, rel=0.08)
     assert standing.distance > 1.1 * FAR
     upright = whole_from_estimate(CAMERA, [mask, view.mask(skeleton.pose())], upper_of(view, 1.05 * FAR), name, standing=False)
     assert upright.distance == pytest.approx(FAR, rel=0.08)  # by the moment in which they stand

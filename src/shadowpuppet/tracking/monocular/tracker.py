@@ -53,10 +53,10 @@ class State(NamedTuple):
     """What the silhouettes have beside the body; None if nothing is left out."""
     mask: Mask | None = None
     """The frame's silhouette (H, W), if the next frame needs it."""
-    observation: Observation | None = None
-    """The frame's, which the estimate was judged by."""
     followed: int = 0
     """Number of frames since the person was last searched for."""
+    observation: Observation | None = None
+    """The frame's, which the estimate was judged by."""
 
 
 @dataclass(frozen=True, eq=False)

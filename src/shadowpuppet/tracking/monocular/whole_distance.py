@@ -33,8 +33,8 @@ DOUBT, WEIGHT = 0.1, 20.0
 
 
 def whole_distance(camera: Camera, masks: Sequence[Mask], body: str, at: Callable[[float], PersonEstimate]) -> float:
-    """The factor on the upper body's distance at which a whole body fits best in masks (H, W), with few different pixels, in usual postures,
-    and on the floor. `at`: the estimate for a factor."""
+    """The factor on the upper body's distance at which a whole body fits best in masks (H, W), with few different pixels, in usual
+    postures, and on the floor. `at`: the estimate for a factor."""
     chosen = [masks[k] for k in evenly_spread(len(masks), MOMENTS)]
     factors = STEP ** np.arange(-STEPS, STEPS + 1.0)
     costs = np.array([_cost(camera, chosen, body, at(factor), factor) for factor in factors.tolist()])
