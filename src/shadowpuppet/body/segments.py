@@ -79,20 +79,32 @@ def coarse_arms() -> Array:
     return arms
 
 
+def leg_postures(skeleton: Skeleton, leg: str, flexed: Array) -> Array:
+    """Values (K, d) of a leg's own DOF, rad, for flexions (K, 3) of hip, knee and ankle; the ankle's is positive with the toes down."""
+    return _own(tuple(skeleton.dofs[d] for d in dofs_of(skeleton, leg)), np.insert(flexed, [0, 1], 0.0, axis=1))
+
+
 @cache
 def _coarse_legs() -> Array:
-    """Coarse legs (K, 4), rad: abduction, forward, twist, flexion of the knee."""
-    return np.radians(list(product((-5, 5, 20, 45), (-25, 0, 25, 55, 90), (0, 35), (5, 40, 80, 115))))
+    """Coarse legs (K, 5), rad: abduction, forward, twist, flexion of the knee, and of the ankle, whose toes point down where the shank may
+    lie on the floor."""
+    legs = product((-5, 5, 20, 45), (-25, 0, 25, 55, 90), (0, 35), (5, 40, 80, 115), (0, 55))
+    return np.radians([leg for leg in legs if not leg[4] or (leg[1] <= 0 and leg[3] >= 80)])
 
 
 @cache
 def _coarse(dofs: tuple[Dof, ...]) -> Array:
     if dofs[1].name.endswith("_forward"):
         return coarse_arms()
-    library = _coarse_legs() if "hip" in dofs[0].joint else coarse_arms()
+    out = _own(dofs, _coarse_legs() if "hip" in dofs[0].joint else coarse_arms())
+    out.setflags(write=False)
+    return out
+
+
+def _own(dofs: tuple[Dof, ...], library: Array) -> Array:
+    """Values (K, d) of a limb's own DOF for abduction, forward, twist, flexion and, of a leg, the ankle's flexion: (K, 4) or (K, 5)."""
     out, side = np.zeros((len(library), len(dofs))), 1 if dofs[0].joint.startswith("left") else -1
     x, y, z = (rotation_about(axis, sign * column) for axis, sign, column in zip(np.eye(3), (side, -1, side), library.T))
     out[:, :3], out[:, 3] = rotation_angles(x @ y @ z, dofs[:3]), library[:, 3]
-    out = np.clip(out, [dof.low for dof in dofs], [dof.high for dof in dofs])
-    out.setflags(write=False)
-    return out
+    out[:, 4:5] = library[:, 4:5]
+    return np.clip(out, [dof.low for dof in dofs], [dof.high for dof in dofs])

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from legs import bent, over_floor
 from people import camera
 
 from shadowpuppet.body.anthropometry import sizes_from_height
@@ -13,12 +14,13 @@ from shadowpuppet.body.models import WHOLE, average_sizes, make_body, whole_from
 from shadowpuppet.body.segments import keep_limb_directions
 from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.geometry import inverse
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.person_rig import check_body
 from shadowpuppet.tracking.monocular.initialization import SizeFit, as_whole, find_person
 from shadowpuppet.tracking.monocular.settings import InitializationSettings, make_settings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
-from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+from shadowpuppet.tracking.monocular.tracker import SEARCHED_EVERY, MonocularTracker
 from shadowpuppet.tracking.monocular.whole_body import whole_from_estimate
 from shadowpuppet.tracking.silhouette_cost import Observation
 
@@ -81,7 +83,7 @@ def test_who_kneels_is_not_taken_for_far_away(name):
     mask = view.mask(pose)
     assert not mask[-2:].any()
     seated, standing = (whole_from_estimate(CAMERA, [mask], upper_of(view), name, standing=known) for known in (False, True))
-    assert seated.distance == FAR
+    assert seated.distance == pytest.approx(FAR, rel=0.08)
     assert standing.distance > 1.1 * FAR
     upright = whole_from_estimate(CAMERA, [mask, view.mask(skeleton.pose())], upper_of(view, 1.05 * FAR), name, standing=False)
     assert upright.distance == pytest.approx(FAR, rel=0.08)  # by the moment in which they stand
@@ -97,6 +99,22 @@ def test_widths_follow_the_clothes_and_given_sizes_are_kept(name):
     assert found.sizes.thigh_width > 1.1 * average_sizes(name, HEIGHT).thigh_width
     given = average_sizes(name, HEIGHT)
     assert whole_from_estimate(CAMERA, [mask], upper_of(view), name, given).sizes is given
+
+
+def test_thighs_of_who_squats_are_as_wide_as_in_whole_poses():
+    """Coarse poses have few bends of hips and knees and leave the thighs too thin."""
+    average, view = average_sizes("anatomical", HEIGHT), over_floor("anatomical", hips=0.6)
+    wide = {size: 1.2 * getattr(average, size) for size in ("thigh_width", "knee_width", "calf_width", "ankle_width")}
+    pose = bent(view.body.skeleton, 68, 60)
+    pose[view.body.skeleton.dof_names.index("left_shoulder_x")] = 1.0
+    masks = [replace(view, body=make_body("anatomical", average.with_values(**wide))).mask(pose)] * 2
+    up = (inverse(place(view.camera, 2.5, 0.0)) @ view.T_camera_base)[2, 3]
+    neck, upper = view.body.points(view.body.skeleton.pose()[None], names=["neck"])[0, 0, 2], sizes_from_height(HEIGHT)
+    there = PersonEstimate(upper, HEIGHT, 2.5, float(up + neck) - upper.torso_height)
+    found, coarse = (whole_from_estimate(view.camera, masks, there, "anatomical", distance=2.5, standing=standing).sizes.thigh_width
+                     for standing in (False, True))  # fmt: skip
+    assert abs(found / average.thigh_width - 1.2) < 0.08
+    assert coarse < 0.97 * found
 
 
 @pytest.mark.parametrize("name", WHOLE)
@@ -130,6 +148,26 @@ def test_who_moves_arms_and_legs_is_followed(name):
     seen = shown[..., :2] / shown[..., 2:]
     assert np.abs(seen[0] - seen[1]).max() * CAMERA.matrix[0, 0] < 15  # pixels, of 170 that the person is tall
     assert state.pose[view.body.skeleton.dof_names.index("root_x")] == 0  # the distance is not sought
+
+
+@pytest.mark.parametrize(("overrides", "again"), [({}, True), ({"turned": False}, False)])
+def test_who_sat_down_unnoticed_is_found_when_searched_for_again(overrides, again):
+    view = over_floor("anatomical", hips=0.5)
+    seated = view.mask(bent(view.body.skeleton, 85, 88))
+    tracker = MonocularTracker(view, make_settings(overrides={"body": "anatomical", **overrides}))
+    wrong = tracker.judge(view.body.skeleton.pose(), [], tracker.observe(seated, view.body.skeleton.pose()))
+    assert tracker.searched_again(np.random.default_rng(1), wrong._replace(followed=SEARCHED_EVERY - 1), seated).pose is wrong.pose
+    found = tracker.searched_again(np.random.default_rng(1), wrong._replace(followed=SEARCHED_EVERY), seated)
+    assert (found.pose is not wrong.pose) == again
+    if not again:
+        return
+    assert found.followed == 0
+    assert tracker.misfit(found) < 0.5 * tracker.misfit(wrong)
+    knees = view.body.skeleton.dof_indices(["left_knee_flexion", "right_knee_flexion"])
+    np.testing.assert_allclose(np.degrees(found.pose[knees]), 88, atol=25)
+    kept = tracker.searched_again(np.random.default_rng(2), found._replace(followed=SEARCHED_EVERY), seated)
+    assert kept.followed == 0  # the search is due again after as many frames, whichever pose is kept
+    assert tracker.misfit(kept) <= tracker.misfit(found)
 
 
 @pytest.mark.parametrize("name", WHOLE)

@@ -11,6 +11,7 @@ from shadowpuppet.body.segments import PULLED_POINTS, coarse_limbs
 from shadowpuppet.body.upper_body import TWIST
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.monocular.leg_postures import FLOOR_WEIGHT, floor_cost, posture_penalty
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.stages import FilterStage
 from shadowpuppet.tracking.particle_filter import Particles, Propose
@@ -25,14 +26,22 @@ MEAN_TEMPERATURE = 50.0
 """For the mean estimate: a particle's weight falls to 1/e for this much more cost (pixels at 320 x 240)."""
 
 
-def make_stage(picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None) -> FilterStage:
-    """The paper's stage, or the extended one if the settings use any extension. Arguments and errors: as for `FilterStage`."""
+def make_stage(picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None,
+               floor: float | None = None) -> FilterStage:
+    """The paper's stage, or the extended one if the settings use any extension. `floor`: its height in the world,
+    metres, if it is known. Other arguments and errors: as for `FilterStage`."""
     extended = settings.explore or settings.motion_weight or settings.posture_weight or settings.estimate != "best"
-    return (ExtendedStage if extended else FilterStage)(picture, settings, name, scheme)
+    return ExtendedStage(picture, settings, name, scheme, floor) if extended else FilterStage(picture, settings, name, scheme)
 
 
 class ExtendedStage(FilterStage):
     """A stage with exploration, a pull to usual postures, a pull to the last frame, and a mean estimate, as set in the settings."""
+
+    def __init__(self, picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None,
+                 floor: float | None = None) -> None:
+        """Arguments and errors as for `make_stage`."""
+        super().__init__(picture, settings, name, scheme)
+        self.floor = floor if settings.posture_weight and any(part.endswith("leg") for part in self.parts) else None
 
     def propose(self, cycle: int, narrow: bool = False) -> Propose:
         """The paper's noise; in the first cycle of a stage of one part also `explore` candidates."""
@@ -65,7 +74,8 @@ class ExtendedStage(FilterStage):
     def extra_costs(self, observation: Observation, last: Array) -> list[Cost]:
         """The pulls to usual postures and to the last frame's estimate (D,), and the caller's own cost."""
         posture, motion = self.settings.posture_weight * self.scale, self.settings.motion_weight * self.scale
-        costs: list[Cost] = [lambda poses: posture * self.picture.body.skeleton.posture_penalty(poses)] if posture else []
+        costs: list[Cost] = [lambda poses: posture * posture_penalty(self.picture.body.skeleton, poses)] if posture else []
+        costs += [] if self.floor is None else [floor_cost(self.picture, self.floor, FLOOR_WEIGHT * self.scale)]
         costs += [self._motion_cost(motion, last)] if motion else []
         return costs + super().extra_costs(observation, last)
 

@@ -16,7 +16,8 @@ from shadowpuppet.camera.rasterize import Picture, count, pack
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular import pose_search
 from shadowpuppet.tracking.monocular.extended_stage import make_stage
-from shadowpuppet.tracking.monocular.settings import MonocularSettings
+from shadowpuppet.tracking.monocular.leg_postures import FLOOR_WEIGHT, floor_below, floor_cost, posture_penalty
+from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.stages import FilterStage
 from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate, step
 from shadowpuppet.tracking.recovery import settle, track_or_recover
@@ -29,6 +30,10 @@ NARROW = 0.08
 """Share of the trunk outside the silhouette above which the person has turned: when they turn quickly it is 0.1 to 0.2, and otherwise, made
 people bending, boxing and twisting, below 0.06."""
 TRUNK = ("torso", "waist")
+SEARCHED_EVERY, BETTER = 8, 0.95
+"""Number of frames after which the pose of a whole body is searched for beside the tracked one: who sits down or squats changes trunk and
+legs together, which stages of one part each do not follow. And the ratio of their misfits below which what is found replaces the tracked
+one: the difference between two searches is up to 5 %."""
 
 
 class State(NamedTuple):
@@ -48,6 +53,8 @@ class State(NamedTuple):
     """What the silhouettes have beside the body; None if nothing is left out."""
     mask: Mask | None = None
     """The frame's silhouette (H, W), if the next frame needs it."""
+    followed: int = 0
+    """Number of frames since the person was last searched for."""
     observation: Observation | None = None
     """The frame's, which the estimate was judged by."""
 
@@ -76,6 +83,7 @@ class MonocularTracker:
         found = track_or_recover(
             state, is_absent=self.is_absent(rest, state.pose), recover=self.settings.recover, hold=self.absent,
             cycle=lambda state: self.cycle(rng, state, mask, also), search=lambda: self.start(rng, rest, also))  # fmt: skip
+        found = self.searched_again(rng, found._replace(followed=state.followed + 1), rest, also)
         if self.looks:
             found = found._replace(unexplained=self.unexplained(state.unexplained, mask, found))
         return found._replace(mask=mask) if self.blurred else found
@@ -96,6 +104,20 @@ class MonocularTracker:
                 estimate = stage.put(estimate, stage.estimate(particles[i]))
                 others = estimate if stage.moves_torso else others
         return self.judge(estimate, particles, whole)
+
+    def searched_again(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
+        """A whole body's state, or after every `SEARCHED_EVERY` frames, with `turned`, a better one searched for in the mask (H, W)."""
+        legs = any(limb.endswith("leg") for limb in limbs_of(self.picture.body.skeleton))
+        if not legs or not self.settings.turned or state.status == "absent" or state.followed < SEARCHED_EVERY:
+            return state
+        found, state = self.start(rng, mask, also), state._replace(followed=0)
+        return found if found.status != "absent" and self.misfit(found) < BETTER * self.misfit(state) else state
+
+    def misfit(self, state: State) -> float:
+        """Cost of a state's estimate with that of its posture and of feet below the floor, pixels."""
+        pose, scale, floor = state.pose[None], pixel_scale(self.picture.camera.size), floor_below(self.picture)
+        total = state.cost + scale * self.settings.posture_weight * float(posture_penalty(self.picture.body.skeleton, pose)[0])
+        return total if floor is None else total + float(floor_cost(self.picture, floor, FLOOR_WEIGHT * scale)(pose)[0])
 
     def start(self, rng: np.random.Generator, mask: Mask, also: Cost | None = None) -> State:
         """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then cycles on this mask; `absent` if no
@@ -167,4 +189,5 @@ class MonocularTracker:
         """The filter's stages, in order; a whole body's legs that are not among them are added at the end."""
         named, limbs = self.settings.stages, limbs_of(self.picture.body.skeleton)
         legs = [limb for limb in limbs if limb.endswith("leg") and not any(limb in name for name in named)]
-        return tuple(make_stage(self.picture, self.settings, name, self.scheme) for name in (*named, *legs))
+        floor = floor_below(self.picture)
+        return tuple(make_stage(self.picture, self.settings, name, self.scheme, floor) for name in (*named, *legs))

@@ -1,0 +1,98 @@
+"""Usual postures of legs, for one camera: standing, squatting, seated, kneeling; and the floor, which no leg goes below.
+
+A silhouette from the front says little of a leg's depth: straight legs and those of a seated person look alike where the feet are out of
+the picture. A pull to standing legs alone would decide for straight ones.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from shadowpuppet.body.segments import dofs_of, leg_postures, limbs_of
+from shadowpuppet.body.skeleton import Skeleton
+from shadowpuppet.camera.rasterize import Picture
+from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.silhouette_cost import Cost
+
+USUAL = np.radians([(50, 70, -15), (88, 90, 0), (110, 120, -25), (0, 90, 55)])
+"""Flexion of hip, knee and ankle (upward negative) of usual legs besides standing ones, rad: half a squat, seated, a squat, kneeling."""
+SPREAD = np.radians((25, 25, 20))
+"""Their standard deviations."""
+RARER = np.array([1.0, 1.0, 2.0, 2.0])
+"""What they cost more than standing, in squared deviations."""
+BOUND = 9.0
+"""Bound of a DOF's squared deviation, as of `Skeleton.posture_penalty`."""
+ABOVE_FLOOR, BELOW_FEET = 0.05, 0.15
+"""Least height of the hips over the floor, metres; and how far below the straight legs' soles a floor may be that is the person's."""
+FLOOR_WEIGHT = 5000.0
+"""Cost of a point of the feet or a knee below the floor (pixels per m^2, at 320 x 240)."""
+CONTACT_WEIGHT, REACH = 20000.0, 0.15
+"""Cost of the body's lowest point off the floor, where the person's place is looked for, in the same unit; and the distance (m) at which it
+no longer grows much."""
+
+
+def posture_penalty(skeleton: Skeleton, poses: Array) -> Array:
+    """As `Skeleton.posture_penalty` (N,) of poses (N, D), but each leg's is that of the nearest usual posture."""
+    legs = [limb for limb in limbs_of(skeleton) if limb.endswith("leg")]
+    if not legs:
+        return skeleton.posture_penalty(poses)
+    rest, below, above = skeleton.rest_and_spread
+    off = poses - rest
+    squared = (off / np.where(off < 0, below, above)) ** 2
+    bounded = squared / (1 + squared / BOUND)
+    total = bounded.sum(1)
+    for leg in legs:
+        dofs, (usual, spread) = dofs_of(skeleton, leg), _usual(skeleton, leg)
+        standing = bounded[:, dofs].sum(1)
+        other = ((poses[:, None, dofs] - usual) / spread) ** 2
+        total += np.minimum((RARER + (other / (1 + other / BOUND)).sum(2)).min(1) - standing, 0)
+    return total
+
+
+@cache
+def _usual(skeleton: Skeleton, leg: str) -> tuple[Array, Array]:
+    """The `USUAL` values (K, d) of a leg's DOF, and their standard deviations (d,)."""
+    dofs = dofs_of(skeleton, leg)
+    _, below, above = (each[dofs] for each in skeleton.rest_and_spread)
+    usual = leg_postures(skeleton, leg, USUAL)
+    bent = np.argmax(np.ptp(usual, axis=0)[:3])  # the hip's DOF that flexes it
+    spread = np.minimum(below, above)
+    spread[bent], spread[3] = SPREAD[:2]
+    spread[4:5] = SPREAD[2]
+    return usual, spread
+
+
+def floor_below(picture: Picture) -> float | None:
+    """Height (m) of the floor in the world, which is 0 in the calibration's; None if the camera's place is not known, or this cannot be the
+    floor on which the person is whose hips are at the body's place."""
+    skeleton = picture.body.skeleton
+    if not picture.camera.oriented or not any(limb.endswith("leg") for limb in limbs_of(skeleton)):
+        return None
+    hips, ankles = picture.points_world(skeleton.pose()[None], ["left_hip", "left_ankle"])[0, :, 2]
+    return 0.0 if ankles - BELOW_FEET <= 0 <= hips - ABOVE_FLOOR else None
+
+
+def contact_cost(picture: Picture, level: float, weight: float) -> Cost:
+    """The cost (N,) of poses (N, D) whose lowest point is above or below a floor at a height `level` (m) in the world; `weight`: per m^2.
+    It is bounded: a person may jump, or sit with hanging feet."""
+    names = _lowest(picture)
+
+    def cost(poses: Array) -> Array:
+        squared = (picture.points_world(poses, names)[..., 2].min(1) - level) ** 2
+        return weight * squared / (1 + squared / REACH**2)
+
+    return cost
+
+
+def floor_cost(picture: Picture, level: float, weight: float) -> Cost:
+    """The cost (N,) of poses (N, D) whose feet or knees are below a floor at a height `level` (m) in the world; `weight`: per m^2."""
+    names = _lowest(picture)
+    return lambda poses: weight * (np.minimum(picture.points_world(poses, names)[..., 2] - level, 0) ** 2).sum(1)
+
+
+def _lowest(picture: Picture) -> list[str]:
+    """Names of the landmarks that may be on the floor."""
+    known = picture.body.landmark_names
+    return [f"{side}_{name}" for side in ("left", "right") for name in ("heel", "toe", "ankle", "knee") if f"{side}_{name}" in known]
