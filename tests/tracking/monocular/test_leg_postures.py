@@ -40,7 +40,8 @@ def naive_penalty(skeleton: Skeleton, pose: Array) -> float:
 @pytest.mark.parametrize("name", WHOLE)
 def test_a_leg_costs_what_the_nearest_usual_posture_says(name, rng):
     skeleton = make_body(name, average_sizes(name, HEIGHT)).skeleton
-    poses = np.concatenate([random_poses(rng, skeleton, 30), [bent(skeleton, *flexed) for flexed in ((0, 0), (88, 90), (110, 120), (0, 90))]])
+    usual = [bent(skeleton, *flexed) for flexed in ((0, 0), (88, 90), (110, 120), (0, 90))]
+    poses = np.concatenate([random_poses(rng, skeleton, 30), usual])
     np.testing.assert_allclose(posture_penalty(skeleton, poses), [naive_penalty(skeleton, pose) for pose in poses])
 
 
