@@ -19,8 +19,8 @@ from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.body.skeleton import SIDES, Coupling, Dof, Joint, Skeleton
 from shadowpuppet.geometry import Array
 
-TWIST, BEND = "torso_twist", "torso_bend"
-"""Degrees of freedom of the trunk: its turn about the vertical, and to the side."""
+TWIST, BEND, BOW = "torso_twist", "torso_bend", "torso_bow"
+"""Degrees of freedom of the trunk: its turn about the vertical, to the side, and forward."""
 
 
 def _arm(side: str, sizes: CardboxSizes, bends: bool) -> tuple[list[Joint], list[Dof]]:
@@ -62,7 +62,7 @@ def upper_body_skeleton(sizes: CardboxSizes, clavicles: bool = False, bends: boo
     dofs = [
         Dof("torso_y", "pelvis", "y", kind="translation"),
         Dof(TWIST, "pelvis", "z", *np.radians([-90, 90]), spread=(0.7, 0.7)),
-        Dof("torso_bow", "torso", "y", *np.radians([-10, 90]), spread=(0.06, 0.06)),
+        Dof(BOW, "torso", "y", *np.radians([-10, 90]), spread=(0.06, 0.06)),
         Dof(BEND, "torso", "x", *np.radians([-50, 50]), spread=(0.25, 0.25)),
     ]
     for side in SIDES:

@@ -64,6 +64,12 @@ def test_an_arm_before_the_trunk_is_doubtful_and_the_other_is_not_affected():
     np.testing.assert_allclose(unseen.joint_sd[RIGHT_HAND], seen.joint_sd[RIGHT_HAND], rtol=0.5)
 
 
+@pytest.mark.parametrize(("degrees", "statuses"), [(60, {"tracked"}), (85, {"uncertain"})])
+def test_a_trunk_that_bows_as_low_as_a_seated_person_is_not_vouched_for(degrees, statuses):
+    found, _ = doubt(pose(torso_bow=np.radians(degrees), left_shoulder_abduction=1.2, right_shoulder_abduction=1.2))
+    assert {found.limb_status[0]} == statuses
+
+
 def test_silhouette_that_nothing_explains_near_an_arm_makes_it_doubtful():
     mask = people.picture().mask(pose())
     pixel = np.rint(people.picture().camera.project(people.picture().points_world(pose()[None])[0][LEFT_HAND])).astype(int)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.body.upper_body import BOW
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import unpack
 from shadowpuppet.geometry import Array
@@ -41,6 +42,9 @@ TRUNK_REACH = 1.0
 """The same about the neck for the trunk, metres."""
 MOST_UNEXPLAINED = 2.0
 """Bound of the unexplained silhouette, over the limb's area."""
+BOWS_LOW = np.radians(75.0)
+"""Bow of an upper body's trunk from which on it is not vouched for: the person may as well have come lower, as one who sits down, which a
+body that keeps its height can only imitate so. The silhouette may fit all the same."""
 
 
 class Before(NamedTuple):
@@ -69,7 +73,18 @@ class MonocularDoubt:
         evidence, now = self.evidence(state, mask, seconds, before)
         R = picture.camera.T_camera_world[:3, :3].T
         skeleton = picture.body.skeleton
-        return state_doubt("monocular", evidence, self.names, skeleton, picture.points, state.pose, state.status, R), now
+        found = state_doubt("monocular", evidence, self.names, skeleton, picture.points, state.pose, state.status, R)
+        return (found._replace(limb_status=self._without_trunk(found.limb_status)) if self._bows_low(state.pose) else found), now
+
+    def _bows_low(self, pose: Array) -> bool:
+        """Whether the trunk of a pose (D,) bows over `BOWS_LOW`."""
+        names = self.tracker.picture.body.skeleton.dof_names
+        return BOW in names and bool(pose[names.index(BOW)] > BOWS_LOW)
+
+    def _without_trunk(self, statuses: Sequence[str]) -> tuple[str, ...]:
+        """The limbs' statuses with a trunk that is not vouched for."""
+        return tuple("uncertain" if limb == "trunk" and status == "tracked" else status
+                     for limb, status in zip(joints_of_limbs(self.names), statuses, strict=True))
 
     def evidence(self, state: State, mask: Mask, seconds: float, before: Before | None) -> tuple[Evidence, Before]:
         """What the frame shows about the accuracy of the estimate of a mask (H, W) at a time (s); and what the next frame needs.
