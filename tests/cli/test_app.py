@@ -137,8 +137,8 @@ def test_track_tells_what_it_found_and_what_came_out(shell, recording, tmp_path)
     assert "\x1b" not in out
     assert max(map(len, out.splitlines())) <= 80
     assert not any(line.endswith(" ") for line in out.splitlines())
-    assert out.startswith("verdict  good\n")
-    assert out.count("verdict  ") == out.count("verdict on the run  ") == 1
+    assert out.startswith("verdict on the film  good\n")
+    assert out.count("verdict on the film  ") == out.count("verdict on the run  ") == 1
     assert "exact masks" not in out
     for word in ("camera     cam, 160 x 120 pixels, 60 degrees wide, calibrated",
                  f"film       {made.FRAMES} frames, 8 frames/s", "scale", "person", f"frames   {made.FRAMES}",
@@ -216,7 +216,7 @@ def test_what_a_message_quotes_is_printed_as_it_is(capsys):
 def test_info_looks_and_leaves_nothing(shell, recording, tmp_path):
     code, out, err = shell("info", recording)
     assert (code, err) == (0, "")
-    assert out.startswith("verdict  good\n")
+    assert out.startswith("verdict on the film  good\n")
     assert "exact masks" not in out
     code, out, err = shell("info", recording, "--verbose")
     assert (code, err) == (0, "")
@@ -401,7 +401,7 @@ def test_nobody_in_the_film(shell, spoilt, tmp_path):
     made.write_film(spoilt / "video" / "cam.mp4", made.images(spoilt / "background" / "cam.mp4") * 4)
     code, out, err = shell("track", spoilt, "-o", "run")
     assert code == 2
-    assert out.startswith("verdict  bad\nbecause  the silhouette is empty in 100 % of the frames")
+    assert out.startswith("verdict on the film  bad\nbecause              the silhouette is empty in 100 % of the frames")
     assert err.startswith("error: ")
     assert "the silhouette is empty in 100 % of the frames: nobody is in the picture" in err
     assert not (tmp_path / "run").exists()

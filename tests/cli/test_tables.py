@@ -112,7 +112,7 @@ def test_people(printed):
 
 def test_verdicts(printed):
     def verdict(word, *reasons):
-        return printed(verdict_table(SimpleNamespace(word=word, reasons=reasons)))
+        return printed(verdict_table(SimpleNamespace(word=word, reasons=reasons), "verdict"))
 
     assert verdict("good", "it is dark", "it is far") == ["verdict good", "but it is dark", "it is far"]
     assert verdict("bad", "it is dark") == ["verdict bad", "because it is dark"]

@@ -73,7 +73,7 @@ def seen_height(height: float | None) -> str | None:
     return None if height is None else f"{height:.2f} m tall, hair, shoes and raised hands included"
 
 
-def verdict_table(verdict: Verdict, title: str = "verdict") -> RenderableType:
+def verdict_table(verdict: Verdict, title: str) -> RenderableType:
     """One word, and the reasons below it."""
     joined = "but" if verdict.word == "good" else "because"
     return pairs([(title, verdict.word), *(("" if n else joined, reason) for n, reason in enumerate(verdict.reasons))])

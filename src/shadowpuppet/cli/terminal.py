@@ -135,7 +135,8 @@ class Terminal(LiveListener):
         """Show the verdict on a recording and its reasons, and what it holds; if `verbose`, all that was found."""
         if not self.quiet:
             self.stop()
-            show(verdict_table(verdict_of_look(look)), look_table(look, self.verbose))
+            of = f"verdict on the {'films' if isinstance(look, RigLook) else 'film'}"
+            show(verdict_table(verdict_of_look(look), of), look_table(look, self.verbose))
         if self.quiet or self.verbose:
             self.doubt(look)
 
