@@ -58,7 +58,7 @@ def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEsti
         return there if sizes is not None else _with_clothes(camera, masks, there, whole, body, search)
 
     if distance is None and standing:
-        estimate = _over_soles(camera, masks, estimate, neck, body)
+        estimate = _over_soles(camera, masks, estimate, neck, body, whole)
     elif distance is None:
         factor = whole_distance(camera, masks, body, lambda factor: dressed(_at_distance(estimate, factor, neck)))
         estimate = _at_distance(estimate, factor, neck)
@@ -68,13 +68,14 @@ def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEsti
     return estimate
 
 
-def _over_soles(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, neck: float, body: str) -> PersonEstimate:
+def _over_soles(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, neck: float, body: str,
+                sizes: BoneSizes) -> PersonEstimate:
     """The estimate at the distance at which a standing person's soles are where the masks (H, W) end, if any ends in the picture."""
     soles = np.array([np.flatnonzero(mask.any(1))[-1] for mask in masks if not mask[-CUT_OFF_ROWS:].any()])
     if not len(soles):
         return estimate
     candidates = [_at_distance(estimate, factor, neck) for factor in DISTANCE_FACTORS]
-    rows = np.array([_soles_row(each.picture(camera, body), each.sizes) for each in candidates])
+    rows = np.array([_soles_row(each.picture(camera, body), sizes) for each in candidates])
     return candidates[int(np.argmin(np.abs(rows - np.median(soles))))]
 
 
