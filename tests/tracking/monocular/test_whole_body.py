@@ -20,7 +20,7 @@ from shadowpuppet.pipeline.person_rig import check_body
 from shadowpuppet.tracking.monocular.initialization import SizeFit, as_whole, find_person
 from shadowpuppet.tracking.monocular.settings import InitializationSettings, make_settings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
-from shadowpuppet.tracking.monocular.tracker import SEARCHED_EVERY, MonocularTracker
+from shadowpuppet.tracking.monocular.tracker import GROWN, SEARCHED_AFTER, MonocularTracker
 from shadowpuppet.tracking.monocular.whole_body import whole_from_estimate
 from shadowpuppet.tracking.silhouette_cost import Observation
 
@@ -156,8 +156,10 @@ def test_who_sat_down_unnoticed_is_found_when_searched_for_again(overrides, agai
     seated = view.mask(bent(view.body.skeleton, 85, 88))
     tracker = MonocularTracker(view, make_settings(overrides={"body": "anatomical", **overrides}))
     wrong = tracker.judge(view.body.skeleton.pose(), [], tracker.observe(seated, view.body.skeleton.pose()))
-    assert tracker.searched_again(np.random.default_rng(1), wrong._replace(followed=SEARCHED_EVERY - 1), seated).pose is wrong.pose
-    found = tracker.searched_again(np.random.default_rng(1), wrong._replace(followed=SEARCHED_EVERY), seated)
+    fitted = tracker.misfit(wrong) / (1.1 * GROWN)  # before they sat down
+    for early in (wrong._replace(followed=SEARCHED_AFTER - 1, least=fitted), wrong._replace(followed=SEARCHED_AFTER)):
+        assert tracker.searched_again(np.random.default_rng(1), early, seated).pose is wrong.pose
+    found = tracker.searched_again(np.random.default_rng(1), wrong._replace(followed=SEARCHED_AFTER, least=fitted), seated)
     assert (found.pose is not wrong.pose) == again
     if not again:
         return
@@ -165,7 +167,8 @@ def test_who_sat_down_unnoticed_is_found_when_searched_for_again(overrides, agai
     assert tracker.misfit(found) < 0.5 * tracker.misfit(wrong)
     knees = view.body.skeleton.dof_indices(["left_knee_flexion", "right_knee_flexion"])
     np.testing.assert_allclose(np.degrees(found.pose[knees]), 88, atol=25)
-    kept = tracker.searched_again(np.random.default_rng(2), found._replace(followed=SEARCHED_EVERY), seated)
+    again_due = found._replace(followed=SEARCHED_AFTER, least=tracker.misfit(found) / 2)
+    kept = tracker.searched_again(np.random.default_rng(2), again_due, seated)
     assert kept.followed == 0  # the search is due again after as many frames, whichever pose is kept
     assert tracker.misfit(kept) <= tracker.misfit(found)
 

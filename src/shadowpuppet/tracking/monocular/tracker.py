@@ -30,10 +30,11 @@ NARROW = 0.08
 """Share of the trunk outside the silhouette above which the person has turned: when they turn quickly it is 0.1 to 0.2, and otherwise, made
 people bending, boxing and twisting, below 0.06."""
 TRUNK = ("torso", "waist")
-SEARCHED_EVERY, BETTER = 8, 0.95
-"""Number of frames after which the pose of a whole body is searched for beside the tracked one: who sits down or squats changes trunk and
-legs together, which stages of one part each do not follow. And the ratio of their misfits below which what is found replaces the tracked
-one: the difference between two searches is up to 5 %."""
+SEARCHED_AFTER, GROWN, BETTER = 8, 1.2, 0.95
+"""Number of frames after which the pose of a whole body is searched for beside the tracked one, if its misfit has grown by that factor
+since the last time: who sits down or squats changes trunk and legs together, which stages of one part each do not follow; a search takes
+as long as ten frames. And the ratio of their misfits below which what is found replaces the tracked one: two searches differ by up to
+5 %."""
 
 
 class State(NamedTuple):
@@ -55,6 +56,8 @@ class State(NamedTuple):
     """The frame's silhouette (H, W), if the next frame needs it."""
     followed: int = 0
     """Number of frames since the person was last searched for."""
+    least: float = np.inf
+    """Least misfit of a whole body since then, pixels."""
     observation: Observation | None = None
     """The frame's, which the estimate was judged by."""
 
@@ -83,7 +86,7 @@ class MonocularTracker:
         found = track_or_recover(
             state, is_absent=self.is_absent(rest, state.pose), recover=self.settings.recover, hold=self.absent,
             cycle=lambda state: self.cycle(rng, state, mask, also), search=lambda: self.start(rng, rest, also))  # fmt: skip
-        found = self.searched_again(rng, found._replace(followed=state.followed + 1), rest, also)
+        found = self.searched_again(rng, found._replace(followed=state.followed + 1, least=state.least), rest, also)
         if self.looks:
             found = found._replace(unexplained=self.unexplained(state.unexplained, mask, found))
         return found._replace(mask=mask) if self.blurred else found
@@ -106,12 +109,16 @@ class MonocularTracker:
         return self.judge(estimate, particles, whole)
 
     def searched_again(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
-        """A whole body's state, or after every `SEARCHED_EVERY` frames, with `turned`, a better one searched for in the mask (H, W)."""
+        """A whole body's state, or with `turned`, where its misfit has grown, a better one searched for in the mask (H, W)."""
         legs = any(limb.endswith("leg") for limb in limbs_of(self.picture.body.skeleton))
-        if not legs or not self.settings.turned or state.status == "absent" or state.followed < SEARCHED_EVERY:
+        if not legs or not self.settings.turned or state.status == "absent":
             return state
-        found, state = self.start(rng, mask, also), state._replace(followed=0)
-        return found if found.status != "absent" and self.misfit(found) < BETTER * self.misfit(state) else state
+        misfit = self.misfit(state)
+        if state.followed < SEARCHED_AFTER or misfit < GROWN * state.least:
+            return state._replace(least=min(state.least, misfit))
+        found = self.start(rng, mask, also)
+        better = found.status != "absent" and self.misfit(found) < BETTER * misfit
+        return found if better else state._replace(followed=0, least=misfit)
 
     def misfit(self, state: State) -> float:
         """Cost of a state's estimate with that of its posture and of feet below the floor, pixels."""
