@@ -72,7 +72,7 @@ scenes = st.builds(Scene, clothing=st.integers(0, 9), shadow=numbers, noise=st.f
                    bystanders=st.lists(bystanders, max_size=2).map(tuple))  # fmt: skip
 sides = st.integers(16, 999)
 views = st.builds(Viewpoint, size=st.tuples(sides, sides), fov_deg=st.floats(20, 100), height=st.floats(0.5, 3),
-                  distance=st.floats(2.5, 9), azimuth_deg=st.floats(-180, 180), pitch_deg=st.floats(-40, 40),
+                  distance=st.floats(4, 9), azimuth_deg=st.floats(-180, 180), pitch_deg=st.floats(-40, 40),
                   roll_deg=st.floats(-180, 180), yaw_deg=st.floats(-40, 40),
                   distortion=st.sampled_from([(), (-0.02, 0.01, 0.0, 0.0)]))  # fmt: skip
 gestures = st.builds(Gesture, motion=st.sampled_from(sorted(GESTURES)), seconds=st.floats(2, 99))
