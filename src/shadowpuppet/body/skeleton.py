@@ -53,6 +53,17 @@ class Dof:
     """Usual deviations below and above `rest`, the scales of a heavy-tailed distribution."""
 
 
+BOUND = 9.0
+"""Bound of a squared deviation from a usual value: it lets a clearly visible unusual posture win, while the term still decides where the
+image says little."""
+
+
+def bounded(deviations: Array) -> Array:
+    """The squares of deviations (...), in units of their spread, each below `BOUND`."""
+    squared = deviations**2
+    return squared / (1 + squared / BOUND)
+
+
 @dataclass(frozen=True)
 class Coupling:
     """A shift of a joint, in its parent's frame, proportional to a DOF (a "mimic joint")."""
@@ -158,12 +169,14 @@ class Skeleton:
         return (np.array([dof.rest for dof in self.dofs]), *np.array([dof.spread for dof in self.dofs]).T)
 
     def posture_penalty(self, poses: ArrayLike) -> Array:
-        """Penalty (N,) of unusual poses (N, D): squared deviations from rest in units of the spread, each bounded by 9, summed. The
-        bound lets a clearly visible posture win, while the term still decides where the image says little."""
+        """Penalty (N,) of unusual poses (N, D): the sum of their `deviations`."""
+        return self.deviations(poses).sum(1)
+
+    def deviations(self, poses: ArrayLike) -> Array:
+        """Squared deviations (N, D) of poses (N, D) from rest in units of the spread, each `bounded`."""
         rest, below, above = self.rest_and_spread
         off = np.asarray(poses, float) - rest
-        squared = (off / np.where(off < 0, below, above)) ** 2
-        return (squared / (1 + squared / 9)).sum(1)
+        return bounded(off / np.where(off < 0, below, above))
 
     def pose(self, **angles: float) -> Array:
         """A pose (D,) from named values; the others are zero."""

@@ -91,26 +91,25 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
     from shadowpuppet.io.people import person_folders
     from shadowpuppet.io.run import read_run
 
-    runs: dict[int | None, Path] = {**person_folders(run)} or {None: run}
-    one = next(iter(runs.values()))
     formats = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
     with terminal(quiet) as listener:
+        runs = [(f" of person {number}", read_run(folder)) for number, folder in person_folders(run).items()] or [("", read_run(run))]
+        _, one = runs[0]
         if to == "all" and find_spec("pyarrow") is None:
             formats.remove("parquet")
             listener.warn(f"parquet is left out: it needs pyarrow; {extra_command('formats')}")
-        if to == "all" and read_run(one).motion.body_name not in WHOLE:
+        if to == "all" and one.motion.body_name not in WHOLE:
             formats.remove("osim")
             listener.warn("osim is left out: only whole bodies have bones of constant lengths, as an OpenSim model needs")
         listener.begin("exporting")
         written = export_run(run, formats, folder, unit, missing, model, weight, rest, names)
-        made = read_run(one)
-        for number, each in runs.items():
-            verdict = (made if each == one else read_run(each)).metrics.get("verdict", {})
+        for of, each in runs:
+            verdict = each.metrics.get("verdict", {})
             if verdict.get("word") == "bad":
-                of, why = f" of person {number}" if number is not None else "", "; ".join(verdict["reasons"])
+                why = "; ".join(verdict["reasons"])
                 listener.warn(f"the verdict on this run{of} is bad ({why}): look at its overlay before you use the motion")
     if not quiet:
-        level, whole = made.floor, made.motion.body_name in WHOLE
+        level, whole = one.floor, one.motion.body_name in WHOLE
         side = "below" if level < 0 else "above"
         where = "the lowest foot over the film is" if whole else "the feet are by the person's height"
         floor = f"{abs(level):.2f} m {side} the camera, where {where}; at 0 in these files"

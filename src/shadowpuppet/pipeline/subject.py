@@ -108,9 +108,9 @@ class TrackedSubject(ABC):
         return False
 
     def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
-        """Motions of the same frames that were tracked forward and backward as one, and the weight (T,) of the backward one; of subjects
-        that are tracked `both_ways`."""
-        raise NotImplementedError
+        """Motions of the same frames that were tracked forward and backward as one, and the weight (T,) of the backward one: 0 for subjects
+        that are not tracked `both_ways`."""
+        return forward, np.zeros(len(forward))
 
     def left_out(self, state: Any) -> tuple[Mask | None, ...]:
         """For each camera the pixels (H, W) that a tracker's state leaves out of the silhouettes, in masks of any size; None for none."""

@@ -26,19 +26,19 @@ def seated():
     return view, [view.mask(pose + share * lift) for share in (0.2, 0.6, 1.0)]
 
 
-@pytest.mark.parametrize("told", [0.9, 1.15])
-def test_who_sits_is_found_where_the_legs_reach_the_floor(seated, told):
-    """The upper body said `told` times the distance, on the same line of sight."""
+@pytest.mark.parametrize("ratio", [0.9, 1.15])
+def test_who_sits_is_found_where_the_legs_reach_the_floor(seated, ratio):
+    """The upper body is taken to be at `ratio` times its distance, on the same line of sight."""
     view, masks = seated
     up = float((np.linalg.inv(place(view.camera, FAR, 0.0)) @ view.T_camera_base)[2, 3])
 
     def at(factor: float) -> PersonEstimate:
-        return PersonEstimate(average_sizes("anatomical", HEIGHT), HEIGHT, FAR * told * factor, up * told * factor)
+        return PersonEstimate(average_sizes("anatomical", HEIGHT), HEIGHT, FAR * ratio * factor, up * ratio * factor)
 
-    np.testing.assert_allclose(at(1 / told).picture(view.camera, "anatomical").T_camera_base, view.T_camera_base, atol=1e-9)
+    np.testing.assert_allclose(at(1 / ratio).picture(view.camera, "anatomical").T_camera_base, view.T_camera_base, atol=1e-9)
     found = whole_distance.whole_distance(view.camera, masks, "anatomical", at) * whole_distance.DRESSED
-    assert found * told == pytest.approx(1, abs=0.05)
-    assert abs(found * told - 1) < abs(told - 1)
+    assert found * ratio == pytest.approx(1, abs=0.05)
+    assert abs(found * ratio - 1) < abs(ratio - 1)
 
 
 def test_a_parabola_of_costs_has_its_vertex_where_it_is_and_noise_far_off_does_not_matter():

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from shadowpuppet.body.segments import dofs_of, leg_postures, limbs_of
-from shadowpuppet.body.skeleton import Skeleton
+from shadowpuppet.body.skeleton import Skeleton, bounded
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.silhouette_cost import Cost
@@ -22,8 +22,6 @@ SPREAD = np.radians((25, 25, 20))
 """Their standard deviations."""
 RARER = np.array([1.0, 1.0, 2.0, 2.0])
 """What they cost more than standing, in squared deviations."""
-BOUND = 9.0
-"""Bound of a DOF's squared deviation, as of `Skeleton.posture_penalty`."""
 ABOVE_FLOOR, BELOW_FEET = 0.05, 0.15
 """Least height of the hips over the floor, metres; and how far below the straight legs' soles a floor may be that is the person's."""
 FLOOR_WEIGHT = 5000.0
@@ -38,16 +36,13 @@ def posture_penalty(skeleton: Skeleton, poses: Array) -> Array:
     legs = [limb for limb in limbs_of(skeleton) if limb.endswith("leg")]
     if not legs:
         return skeleton.posture_penalty(poses)
-    rest, below, above = skeleton.rest_and_spread
-    off = poses - rest
-    squared = (off / np.where(off < 0, below, above)) ** 2
-    bounded = squared / (1 + squared / BOUND)
-    total = bounded.sum(1)
+    deviations = skeleton.deviations(poses)
+    total = deviations.sum(1)
     for leg in legs:
         dofs, (usual, spread) = dofs_of(skeleton, leg), _usual(skeleton, leg)
-        standing = bounded[:, dofs].sum(1)
-        other = ((poses[:, None, dofs] - usual) / spread) ** 2
-        total += np.minimum((RARER + (other / (1 + other / BOUND)).sum(2)).min(1) - standing, 0)
+        standing = deviations[:, dofs].sum(1)
+        other = bounded((poses[:, None, dofs] - usual) / spread).sum(2)
+        total += np.minimum((RARER + other).min(1) - standing, 0)
     return total
 
 

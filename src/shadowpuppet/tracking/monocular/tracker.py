@@ -122,7 +122,7 @@ class MonocularTracker:
 
     def misfit(self, state: State) -> float:
         """Cost of a state's estimate with that of its posture and of feet below the floor, pixels."""
-        pose, scale, floor = state.pose[None], pixel_scale(self.picture.camera.size), floor_below(self.picture)
+        pose, scale, floor = state.pose[None], pixel_scale(self.picture.camera.size), self.floor
         total = state.cost + scale * self.settings.posture_weight * float(posture_penalty(self.picture.body.skeleton, pose)[0])
         return total if floor is None else total + float(floor_cost(self.picture, floor, FLOOR_WEIGHT * scale)(pose)[0])
 
@@ -192,9 +192,13 @@ class MonocularTracker:
         return state._replace(cost=np.nan, overlap=0.0, status="absent")
 
     @cached_property
+    def floor(self) -> float | None:
+        """Height of the floor that a whole body stands on, in the world, metres; None if it is not known (`floor_below`)."""
+        return floor_below(self.picture)
+
+    @cached_property
     def stages(self) -> tuple[FilterStage, ...]:
         """The filter's stages, in order; a whole body's legs that are not among them are added at the end."""
         named, limbs = self.settings.stages, limbs_of(self.picture.body.skeleton)
         legs = [limb for limb in limbs if limb.endswith("leg") and not any(limb in name for name in named)]
-        floor = floor_below(self.picture)
-        return tuple(make_stage(self.picture, self.settings, name, self.scheme, floor) for name in (*named, *legs))
+        return tuple(make_stage(self.picture, self.settings, name, self.scheme, self.floor) for name in (*named, *legs))

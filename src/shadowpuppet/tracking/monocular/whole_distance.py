@@ -14,7 +14,7 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, evenly_spread
-from shadowpuppet.tracking.monocular.leg_postures import CONTACT_WEIGHT, contact_cost, floor_below
+from shadowpuppet.tracking.monocular.leg_postures import CONTACT_WEIGHT, contact_cost
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
@@ -59,7 +59,7 @@ def _vertex(factors: Array, costs: Array) -> float:
 def _cost(camera: Camera, masks: Sequence[Mask], body: str, estimate: PersonEstimate, factor: float) -> float:
     """Mean cost of the poses found in masks (H, W), pixels at 320 x 240."""
     tracker, scale = _tracker(camera, body, estimate), pixel_scale(camera.size)
-    floor, total = floor_below(tracker.picture), 0.0
+    floor, total = tracker.floor, 0.0
     for state in _started(tracker, masks):
         if state.status == "absent":
             return np.inf
