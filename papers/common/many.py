@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from functools import lru_cache
 from multiprocessing import get_context
@@ -28,8 +28,10 @@ def run_all(what: str, task: Callable[[Job], Result], jobs: Sequence[Job], worke
         bar = progress.add_task(what, total=len(jobs))
         if workers <= 1 or len(jobs) <= 1:
             return [_counted(progress, bar, task(job)) for job in jobs]
-        waiting = [_pool(workers).submit(task, job) for job in jobs]
-        try:
+        waiting: list[Future[Result]] = []
+        try:  # a process may be killed before the last job is handed over
+            for job in jobs:
+                waiting.append(_pool(workers).submit(task, job))
             for done in as_completed(waiting):
                 _counted(progress, bar, done.result())
             return [done.result() for done in waiting]

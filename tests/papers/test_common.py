@@ -174,6 +174,12 @@ def test_a_killed_process_is_reported_in_a_sentence():
     assert run_all("jobs", twice, range(2), 2) == [0, 2]  # others are started
 
 
+def test_a_process_killed_while_jobs_are_still_handed_over_is_reported_too():
+    run_all("jobs", twice, range(2), 2)  # processes that are there already
+    with pytest.raises(ShadowPuppetError, match="jobs: a process was killed"):
+        run_all("jobs", killed, range(3, 20_000), 2)
+
+
 def test_processes_stay_for_the_next_time():
     assert len(set(run_all("jobs", whoami, range(4), 2)) | set(run_all("jobs", whoami, range(4), 2))) <= 2
 
