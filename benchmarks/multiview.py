@@ -40,7 +40,7 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.learn_prior import prior_from_files
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.track import track_recording
-from shadowpuppet.synthetic import proving_rings, synthesize
+from shadowpuppet.synthetic import Spec, proving_rings, synthesize
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD, PAGE = ROOT / "build", ROOT / "docs" / "accuracy_multi.md"
@@ -99,10 +99,10 @@ SETS: dict[str, tuple[str, ...]] = {
 # Inputs ---------------------------------------------------------------------------------------------------------------
 
 
-def made(folder: Path, names: Iterable[str] = ()) -> list[Path]:
-    """Folders of the proving ground, or of those recordings named; made where they are missing."""
+def made(folder: Path, names: Iterable[str] = (), specs: Iterable[Spec] | None = None) -> list[Path]:
+    """Folders of the proving ground or of other `specs`, or of those recordings named; made where they are missing."""
     wanted, out = set(names), []
-    for spec in proving_rings():
+    for spec in proving_rings() if specs is None else specs:
         if wanted and spec.name not in wanted:
             continue
         out.append(folder / spec.name)

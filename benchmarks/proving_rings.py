@@ -1,8 +1,9 @@
 """The proving ground of several cameras: settings of the tracker on made recordings, bodies x motions x rings x noise, to choose them by.
 
-    python benchmarks/proving_rings.py [--rows "default;no prior"] [--seeds 1] [--masks] [--frames 180] [--markdown FILE] [--workers 2]
+    python benchmarks/proving_rings.py [--rows "default;no prior"] [--seeds 1] [--cameras 3] [--masks] [--frames 180] [--markdown FILE] [--workers 2]
 
-The recordings (`synthetic.proving_rings`) are made where they are missing, in build/rings. Of each, silhouettes and surface points are
+The recordings (`synthetic.proving_rings`) are made where they are missing, in build/rings; with `--cameras N` the same motions of other
+people, with N cameras elsewhere and no training motion, in build/rings_N. Of each, silhouettes and surface points are
 taken once and the person is measured once for every body, as `shadowpuppet track` does it; then every row tracks the same frames. A row is
 a choice of settings; the table has means and medians of the RMSE over recordings and seeds, and `se`, the standard error of its difference
 from the first row's, in pairs of the same recording: differences within two of them are not significant. `ms` are of one core,
@@ -39,6 +40,8 @@ from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, fit_multiview
 from shadowpuppet.pipeline.rig import open_rig, read_frames
 from shadowpuppet.pipeline.survey.rig import survey_rig
+from shadowpuppet.synthetic import Spec, proving_rings
+from shadowpuppet.synthetic.person.mannequin import Kind, Mannequin
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 
 ROWS: dict[str, dict[str, Any]] = {
@@ -58,6 +61,10 @@ ROWS: dict[str, dict[str, Any]] = {
     "any arms": {"arms": 0.0},
     "no training, any arms": {"training": False, "arms": 0.0},
     "no training, arms x 2": {"training": False, "arms": 2e-4},
+    "any limbs": {"limbs": 0.0},
+    "no training, any limbs": {"training": False, "limbs": 0.0},
+    "no training, any limbs, arms x 2": {"training": False, "limbs": 0.0, "arms": 2e-4},
+    "no training, limbs x 2": {"training": False, "limbs": 2e-4},
     "local search x 2": {"local": 8},
     "noise x 0.5": {"sigma_rotation": 0.075},
     "noise x 2": {"sigma_rotation": 0.3},
@@ -79,6 +86,7 @@ ROWS: dict[str, dict[str, Any]] = {
 }
 """Each the default with something changed. `height` is a factor on the height that the recording tells, from which sizes are then measured;
 `sizes` one on all sizes measured, which stay so: what measuring is worth to a person of whom a wrong height is known."""
+CHILDREN, WOMEN = ("rings_sit", "rings_child"), ("rings_walk", "rings_lift", "rings_reach", "rings_bend")
 
 
 def scaled(name: str, sizes: Sizes, factor: float) -> Body:
@@ -142,6 +150,19 @@ class Case:
         return found | {"ms": 1000 * spent / len(poses)}
 
 
+def with_cameras(spec: Spec, n: int, cameras: int) -> Spec:
+    """The n-th spec's motion by another person, with so many cameras elsewhere, in another room, and no training motion."""
+    assert spec.ring is not None
+    seed = 1000 * cameras + n
+    rng, name = np.random.default_rng(seed), spec.name
+    kind: Kind = "child" if name in CHILDREN else "woman" if name in WOMEN else "man"
+    body = Mannequin.draw(np.random.default_rng(seed), kind, age=8 if name == "rings_child" else None)
+    ring = replace(spec.ring, count=cameras, radius=float(rng.uniform(3.4, 4.4)), height=float(rng.uniform(1.3, 2.3)),
+                   start_deg=float(rng.uniform(0, 90)), jitter=0.6, fov_deg=50, size=(480, 360), seed=seed)  # fmt: skip
+    scene = replace(spec.scene, clothing=seed, room=seed)
+    return replace(spec, body=body, ring=ring, scene=scene, training=(), rate=30, seed=(7, seed))
+
+
 def run(path: Path, rows: Mapping[str, Mapping[str, Any]], seeds: int, masks: bool, frames: int) -> dict[str, list[dict[str, Any]]]:
     """Measures of one recording: row to seeds."""
     case = Case(path, masks, frames)
@@ -187,9 +208,10 @@ def main() -> None:
     parser.add_argument("--rows", default="", help="names, with ; between them: " + "; ".join(ROWS))
     parser.add_argument("--recordings", default="", help="names, with ; between them; all without")
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--cameras", type=int, help="other people and so many cameras; without, the rings as they are")
     parser.add_argument("--masks", action="store_true", help="exact silhouettes in place of those of the films")
     parser.add_argument("--frames", type=int, default=10**6, help="so many of each, at most")
-    parser.add_argument("--folder", type=Path, default=BUILD / "rings", help="where the recordings are, or are made")
+    parser.add_argument("--folder", type=Path, help="where the recordings are, or are made")
     parser.add_argument("--markdown", type=Path, help="write the tables there too")
     parser.add_argument("--workers", type=int, default=2)
     args = smallest.parse(parser, _smallest)
@@ -197,7 +219,9 @@ def main() -> None:
     unknown = [row for row in chosen if row not in ROWS]
     if unknown:
         parser.error(f"unknown row {unknown[0]!r}; there are: {'; '.join(ROWS)}")
-    paths = made(args.folder, filter(None, args.recordings.split(";")))
+    specs = proving_rings() if args.cameras is None else tuple(with_cameras(spec, n, args.cameras) for n, spec in enumerate(proving_rings()))
+    folder = args.folder or BUILD / ("rings" if args.cameras is None else f"rings_{args.cameras}")
+    paths = made(folder, filter(None, args.recordings.split(";")), specs)
     rows, n = {row: ROWS[row] for row in chosen}, len(paths)
     os.environ |= ONE_THREAD_EACH
     with ProcessPoolExecutor(args.workers, get_context("spawn")) as pool:

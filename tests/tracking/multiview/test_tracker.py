@@ -116,7 +116,7 @@ def test_hybrid_keeps_what_image_forces_lose():
 @pytest.mark.parametrize("overrides", [
     {"particles": 1}, {"cycles": 3}, {"estimate": "mean"}, {"silhouettes": 0.0}, {"resampling": "stratified"},
     {"resampling": "multinomial"}, {"resampling": "residual"}, {"velocity": 1.0},
-    {"posture": 0.0}, {"explore": 1.0}, {"local": 0}, {"local": 1}, {"arms": 0.0}, {"surface": {"epsilon": 0.3, "tau": 0.1}},
+    {"posture": 0.0}, {"explore": 1.0}, {"local": 0}, {"local": 1}, {"arms": 0.0}, {"limbs": 0.0}, {"surface": {"epsilon": 0.3, "tau": 0.1}},
     {"gauss_newton": {"coarse": 0}}, {"gauss_newton": {"fine": 0, "share": 1}}, {"refinement": "forces", "forces": {"translation": 0.7}},
     {"refinement": "forces", "forces": {"robust": False, "modulated": False}}, {"hull": {"rays": 600}},
 ], ids=str)  # fmt: skip
@@ -140,13 +140,14 @@ def test_the_local_search_is_the_hybrid_filters_and_ends_at_less_cost():
             np.testing.assert_array_equal(with_it, without)
 
 
-def test_rare_arms_cost_what_they_are_rare():
+@pytest.mark.parametrize("what", ["arms", "limbs"])
+def test_rare_postures_cost_what_they_are_rare(what):
     _, seen = actor.filmed()
     costs, poses = [], track(tracker(), seen[:2])[-1].particles.poses
     for weight in (0.0, 1e-4, 3e-4):
-        of = tracker(arms=weight)
+        of = tracker(**{what: weight})
         costs.append(of.weigh(of.observe(track(of, seen[:1])[0], *seen[1]))(poses)[0])
-    rarity = of.rarity_of_arms(poses)
+    rarity = of.rarity_of_arms(poses) if what == "arms" else of.rarity_of_limbs(poses)
     assert rarity.shape == (len(poses),)
     assert np.ptp(rarity) > 0.05
     np.testing.assert_allclose(costs[1] - costs[0], 1e-4 * rarity, atol=1e-12)
@@ -225,7 +226,8 @@ def test_a_state_says_what_its_pose_costs_and_how_it_moved():
         observation = MultiviewObservation(of.views, points, masks)
         pose = state.pose[None]
         costs = of.refiner.costs(pose, observation.full) + of.settings.silhouettes * observation.mismatch(pose)
-        own = of.settings.posture * of.posture_prior.penalty(pose) + of.settings.arms * of.rarity_of_arms(pose)
+        own = of.settings.posture * of.posture_prior.penalty(pose)
+        own = own + of.settings.arms * of.rarity_of_arms(pose) + of.settings.limbs * of.rarity_of_limbs(pose)
         assert state.cost == pytest.approx((costs + own)[0])
         assert state.overlap == observation.overlap(state.pose)
         np.testing.assert_array_equal(state.velocity, state.pose - before.pose)

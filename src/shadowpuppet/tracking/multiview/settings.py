@@ -132,6 +132,9 @@ class MultiviewSettings:
     arms: NonNegative = 1e-4
     """Weight (m^2) of how rare the posture of each arm is among people, in units of a log density. It chooses between places of an arm that
     silhouettes do not tell apart."""
+    limbs: NonNegative = 1e-4
+    """Weight (m^2) of how rare the posture of arms, legs and trunk together is among people, in units of a log density, bounded. It chooses
+    between postures that few cameras do not tell apart."""
     cycles: Annotated[int, Field(ge=1, le=100)] | None = None
     """Estimation cycles per frame (annealing). None: one for each 1/30 s that a frame lasts, at most four; one when live."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
@@ -196,6 +199,7 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "silhouettes": 0.0,
         "posture": 0.0,
         "arms": 0.0,
+        "limbs": 0.0,
         "patience": 0.0,
         "odd_camera": False,
         "surface": {"epsilon": 0.3, "tau": 0.06, "nearest": "euclidean"},
