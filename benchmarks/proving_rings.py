@@ -156,7 +156,7 @@ def with_cameras(spec: Spec, n: int, cameras: int) -> Spec:
     seed = 1000 * cameras + n
     rng, name = np.random.default_rng(seed), spec.name
     kind: Kind = "child" if name in CHILDREN else "woman" if name in WOMEN else "man"
-    body = Mannequin.draw(np.random.default_rng(seed), kind, age=8 if name == "rings_child" else None)
+    body = Mannequin.draw(np.random.default_rng(seed), kind, age=8 if kind == "child" else None)
     ring = replace(spec.ring, count=cameras, radius=float(rng.uniform(3.4, 4.4)), height=float(rng.uniform(1.3, 2.3)),
                    start_deg=float(rng.uniform(0, 90)), jitter=0.6, fov_deg=50, size=(480, 360), seed=seed)  # fmt: skip
     scene = replace(spec.scene, clothing=seed, room=seed)
