@@ -1,6 +1,7 @@
 """The proving ground of several cameras: settings of the tracker on made recordings, bodies x motions x rings x noise, to choose them by.
 
-    python benchmarks/proving_rings.py [--rows "default;no prior"] [--seeds 1] [--cameras 3] [--masks] [--frames 180] [--markdown FILE] [--workers 2]
+    python benchmarks/proving_rings.py [--rows "default;no prior"] [--seeds 1] [--cameras 3] [--masks] [--frames 180]
+        [--markdown FILE] [--workers 2]
 
 The recordings (`synthetic.proving_rings`) are made where they are missing, in build/rings; with `--cameras N` the same motions of other
 people, with N cameras elsewhere and no training motion, in build/rings_N. Of each, silhouettes and surface points are
@@ -219,7 +220,9 @@ def main() -> None:
     unknown = [row for row in chosen if row not in ROWS]
     if unknown:
         parser.error(f"unknown row {unknown[0]!r}; there are: {'; '.join(ROWS)}")
-    specs = proving_rings() if args.cameras is None else tuple(with_cameras(spec, n, args.cameras) for n, spec in enumerate(proving_rings()))
+    specs = proving_rings()
+    if args.cameras is not None:
+        specs = tuple(with_cameras(spec, n, args.cameras) for n, spec in enumerate(specs))
     folder = args.folder or BUILD / ("rings" if args.cameras is None else f"rings_{args.cameras}")
     paths = made(folder, filter(None, args.recordings.split(";")), specs)
     rows, n = {row: ROWS[row] for row in chosen}, len(paths)

@@ -1,4 +1,4 @@
-"""Usual postures of the whole body: the same for all bodies, mirrors and places; the density and its kernel; what it does to a tracker's costs."""
+"""Usual postures of the whole body: the same for all bodies, mirrors and places; the density and its kernel."""
 
 from __future__ import annotations
 

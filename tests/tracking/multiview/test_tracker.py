@@ -116,7 +116,8 @@ def test_hybrid_keeps_what_image_forces_lose():
 @pytest.mark.parametrize("overrides", [
     {"particles": 1}, {"cycles": 3}, {"estimate": "mean"}, {"silhouettes": 0.0}, {"resampling": "stratified"},
     {"resampling": "multinomial"}, {"resampling": "residual"}, {"velocity": 1.0},
-    {"posture": 0.0}, {"explore": 1.0}, {"local": 0}, {"local": 1}, {"arms": 0.0}, {"limbs": 0.0}, {"surface": {"epsilon": 0.3, "tau": 0.1}},
+    {"posture": 0.0}, {"explore": 1.0}, {"local": 0}, {"local": 1}, {"arms": 0.0}, {"limbs": 0.0},
+    {"surface": {"epsilon": 0.3, "tau": 0.1}},
     {"gauss_newton": {"coarse": 0}}, {"gauss_newton": {"fine": 0, "share": 1}}, {"refinement": "forces", "forces": {"translation": 0.7}},
     {"refinement": "forces", "forces": {"robust": False, "modulated": False}}, {"hull": {"rays": 600}},
 ], ids=str)  # fmt: skip

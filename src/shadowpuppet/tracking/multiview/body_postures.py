@@ -27,6 +27,8 @@ D = 27
 """Numbers that describe a posture: two directions for each of four limbs, and up."""
 FLOOR = 25.0
 """Log density of the rarest postures below that of the components' means, their median."""
+NEGLIGIBLE = 30.0
+"""A component whose log density is less than the sum's by this is left out: e^-30 of it."""
 
 
 def body_directions(joints: Array) -> Array:
@@ -60,7 +62,7 @@ class BodyPostures:
     """Of shape (K, 27, 27)."""
 
     def rarity(self, directions: Array) -> Array:
-        """How rare directions (N, 27) are, (N,): minus the log density, plus that of the components' means in the median; at most `FLOOR`."""
+        """How rare directions (N, 27) are, (N,): minus the log density, plus the median of the components' means'; at most `FLOOR`."""
         both = np.logaddexp(self.log_parts(directions), self.log_parts(mirrored(directions)))
         return self._usual - np.logaddexp(np.logaddexp.reduce(both, axis=1), self._usual - FLOOR)
 
@@ -80,7 +82,7 @@ class BodyPostures:
 
     @cached_property
     def _constants(self) -> tuple[Array, Array]:
-        """Inverse Cholesky factors (K, 27, 27) of the covariances, and each component's log density at its mean, with half its weight (K,)."""
+        """Inverse Cholesky factors (K, 27, 27) of the covariances, and log densities (K,) at the means, half of the weight included."""
         lower = np.linalg.cholesky(self.covariances)
         inverse = np.stack([solve_triangular(one, np.eye(D), lower=True) for one in lower])
         half_determinants = np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(1)
@@ -111,10 +113,6 @@ def _rarities(directions, others, means, factors, offsets, usual, out):  # pragm
             density = _added(density, _log_part(directions[n], means[k], factors[k], offsets[k], density - NEGLIGIBLE))
             density = _added(density, _log_part(others[n], means[k], factors[k], offsets[k], density - NEGLIGIBLE))
         out[n] = usual - density
-
-
-NEGLIGIBLE = 30.0
-"""A component whose log density is less than the sum's by this is left out: e^-30 of it."""
 
 
 @device
