@@ -9,6 +9,7 @@ those with 15. Of each take every third frame counts, and a long take less than 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,20 +26,19 @@ ITERATIONS = 60
 EVERY = 3
 
 
+def joints_of(path: Path, names: Sequence[str]) -> list[Array]:
+    """The joints (T, J, 3) that are named, of each take in a file."""
+    with np.load(path, allow_pickle=False) as takes:
+        known = {17: takes["names_a"].tolist(), 15: takes["names_b"].tolist() if "names_b" in takes else []}
+        found = [takes[name].astype(float)[::EVERY] for name in takes if not name.startswith("names")]
+    return [joints[:, [known[joints.shape[1]].index(name) for name in names]] for joints in found]
+
+
 def directions_of(path: Path) -> tuple[Array, Array]:
     """Arm directions (N, 6) of all takes in a file, and their weights (N,)."""
-    directions, weights = [], []
-    with np.load(path, allow_pickle=False) as takes:
-        for name in takes:
-            if name.startswith("names"):
-                continue
-            joints = takes[name].astype(float)[::EVERY]
-            names = [str(joint) for joint in takes["names_a" if joints.shape[1] == 17 else "names_b"]]
-            found = arm_directions(joints[:, [names.index(joint) for joint in JOINTS]]).reshape(-1, 6)
-            found = found[np.isfinite(found).all(1)]
-            directions.append(found)
-            weights.append(np.full(len(found), 1 / np.sqrt(max(len(found), 1))))
-    return np.concatenate(directions), np.concatenate(weights)
+    found = [arm_directions(joints).reshape(-1, 6) for joints in joints_of(path, JOINTS)]
+    found = [take[np.isfinite(take).all(1)] for take in found]
+    return np.concatenate(found), np.concatenate([np.full(len(take), 1 / np.sqrt(max(len(take), 1))) for take in found])
 
 
 def fit(X: Array, weights: Array, components: int) -> ArmPostures:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import smallest
-from fit_arm_postures import EVERY, PACKAGE, SOURCE
+from fit_arm_postures import PACKAGE, SOURCE, joints_of
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.body_postures import JOINTS, TABLE, BodyPostures, D, body_directions, mirrored
@@ -25,15 +25,8 @@ ITERATIONS = 60
 
 def takes_of(path: Path) -> list[Array]:
     """Directions (N, 27) of each take in a file."""
-    found = []
-    with np.load(path, allow_pickle=False) as takes:
-        for name in takes:
-            if name.startswith("names"):
-                continue
-            joints = takes[name].astype(float)[::EVERY]
-            names = [str(joint) for joint in takes["names_a" if joints.shape[1] == 17 else "names_b"]]
-            directions = body_directions(joints[:, [names.index(joint) for joint in JOINTS]])
-            found.append(directions[np.isfinite(directions).all(1)])
+    found = [body_directions(joints) for joints in joints_of(path, JOINTS)]
+    found = [take[np.isfinite(take).all(1)] for take in found]
     return [take for take in found if len(take)]
 
 
