@@ -11,7 +11,7 @@ import numpy as np
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, may_be_person
-from shadowpuppet.camera.rasterize import Picture
+from shadowpuppet.camera.rasterize import Picture, count
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, make_cloud
 from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, free_space
@@ -82,6 +82,10 @@ class MultiviewObservation:
         """Pixels in which drawn poses (N, D) and silhouettes differ (Liu 2011, eq. 2), as shares (N,) of the silhouettes' area."""
         differing = [silhouette_costs(picture, observation, poses) for picture, observation in self.silhouettes]
         return sum(differing, np.zeros(len(poses))) / max(self.area, 1)
+
+    def outside(self, pose: Array) -> Array:
+        """Pixels of a drawn pose (D,) outside each silhouette that shows a person, as shares (P,) of its area."""
+        return np.array([count(picture.draw(pose) & ~seen.silhouette) / max(seen.area, 1) for picture, seen in self.silhouettes])
 
     def overlaps(self, pose: Array) -> Array:
         """Intersection over union of a drawn pose (D,) and the silhouette of each camera, (C,); NaN where no person is visible."""
