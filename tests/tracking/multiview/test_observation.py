@@ -36,6 +36,11 @@ def plain(stage, masks, pose) -> tuple[int, int, list[float]]:
     return differing, area, [(d & m).sum() / (d | m).sum() for d, m in pairs]
 
 
+def _drawn(n: int, pose):
+    camera = actor.cameras()[n]
+    return Picture(actor.body(), _half_size(camera), camera.T_camera_world).mask(pose)
+
+
 @pytest.mark.parametrize("size", [(160, 120), (161, 121), (7, 6)])
 def test_a_thinned_camera_has_every_second_pixel(size, rng):
     camera = looking((3, 1, 0.5), size=size, focal=200.0, distortion=(-0.1, 0.02, 0.001, 0.0))
@@ -57,6 +62,8 @@ def test_differing_pixels_and_overlap_are_those_counted_one_by_one(stage, which,
     for pose, share in zip(poses, found):
         differing, area, overlaps = plain(stage, given, pose)
         assert share == pytest.approx(differing / max(area, 1))
+        drawn = [(_drawn(n, pose), masks[n][::2, ::2]) for n in which]
+        np.testing.assert_allclose(observation.outside(pose), [(d & ~m).sum() / m.sum() for d, m in drawn])
         assert observation.overlap(pose) == pytest.approx(np.mean(overlaps) if overlaps else 0.0)
         assert observation.area == area
 

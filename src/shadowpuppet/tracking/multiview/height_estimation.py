@@ -14,6 +14,7 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import HEIGHTS
+from shadowpuppet.body.skeleton import bounded
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, evenly_spread
@@ -30,7 +31,8 @@ OUTSIDE = 0.05
 """Weight (m^2) of the share of the drawn body that is outside the silhouettes, of all cameras but the worst. Furniture that the silhouettes
 contain makes large bodies fit; furniture that hides the person hides them from one camera most."""
 PENALTY, DEVIATION = 0.02, 0.1
-"""Relative cost of a height that deviates from the average by `DEVIATION` (m); it grows with the square."""
+"""Relative cost of a height that deviates from the average by `DEVIATION` (m), that of adults in ANSUR II (Gordon et al. 2014), women and
+men together; it grows with the square, and is bounded for the sake of children."""
 LEAST_POINTS, STRAY = 50, 2
 """Least number of surface points of a person; number of points at each end of an extent that may be noise."""
 
@@ -65,7 +67,8 @@ def estimate_height(rng: np.random.Generator, make: Callable[[float], Body], cam
             tracker = MultiviewTracker(make(height), tuple(cameras), plain)
             tried[step] = np.array([_misfit(rng, tracker, *first[n]) for n in chosen])
         seen = tried[step][np.isfinite(tried[step])]
-        return float(seen.mean() * (1 + PENALTY * ((height - AVERAGE_HEIGHT) / DEVIATION) ** 2)) if len(seen) else np.inf
+        unusual = bounded(np.array((height - AVERAGE_HEIGHT) / DEVIATION))
+        return float(seen.mean() * (1 + PENALTY * unusual)) if len(seen) else np.inf
 
     at = 0
     while (better := min((at - 1, at + 1), key=cost)) is not None and cost(better) < cost(at):
