@@ -110,18 +110,20 @@ def test_a_person_who_sits_is_as_tall_as_they_stand():
     assert seen.height == pytest.approx(1.6, abs=0.04)
 
 
+def left_half(mask):
+    return mask & (np.arange(mask.shape[1]) < np.flatnonzero(mask.any(0)).mean())
+
+
 def test_what_is_drawn_beside_the_silhouettes_makes_a_body_fit_worse():
     """In all cameras but the worst: there, furniture may hide the person."""
-    of, pose = actor.body(), actor.filmed()[0][0]
     surface, masks = actor.filmed()[1][0]
-    tracker = height_estimation.MultiviewTracker(of, actor.cameras(), SETTINGS)
+    tracker = height_estimation.MultiviewTracker(actor.body(), actor.cameras(), SETTINGS)
     state = tracker.start(np.random.default_rng(0), surface, masks)
 
     def added(cut: int) -> float:
-        shown = [mask & (np.arange(mask.shape[1]) < np.flatnonzero(mask.any(0)).mean()) if n < cut else mask for n, mask in enumerate(masks)]
+        shown = [left_half(mask) if n < cut else mask for n, mask in enumerate(masks)]
         fixed = types.SimpleNamespace(views=tracker.views, start=lambda *_: state)
         return height_estimation._misfit(np.random.default_rng(0), fixed, surface, shown) - state.cost
 
     assert added(1) == pytest.approx(added(0), abs=1e-4)
     assert added(2) > added(1) + 1e-3
-    assert len(pose)

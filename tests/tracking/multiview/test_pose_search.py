@@ -127,36 +127,39 @@ def test_as_many_are_given_as_asked_for_and_the_same_seed_finds_the_same(number)
         np.testing.assert_array_equal(a, b)
 
 
-def test_a_person_on_a_chair_that_the_silhouettes_contain_is_found(rng):
-    """Its legs and back are in the hull, too: it is lower and farther back than the person."""
-    of = actor.body()
-    skeleton, cameras = of.skeleton, actor.cameras(3)
-    pose = actor.stance(skeleton, 0.0, 0.3)
-    pose[skeleton.dof_indices(["left_hip_y", "right_hip_y", "left_knee_flexion", "right_knee_flexion"])] = np.radians([-85, -85, 88, 88])
-    pelvis = of.points(pose[None], names=["pelvis"])[0, 0]
-    boxes = [((-0.2, 0.2), (-0.2, 0.2), (-0.5, -0.11)), ((-0.3, -0.16), (-0.2, 0.2), (-0.5, 0.35))]
-    masks = actor.masks(of, pose, 3)
-    for box in boxes:
-        corners = np.stack(np.meshgrid(*box), -1).reshape(-1, 3) @ turned(0.3).T + pelvis
+def test_postures_on_the_floor_are_tried_too(monkeypatch, rng):
+    pose, lowest = actor.stance(actor.body().skeleton, 0.3, 1.0), []
+    monkeypatch.setattr(pose_search, "place_postures", lambda of, some, middle: place_postures(of, some, middle + 5.0))
+    monkeypatch.setattr(pose_search, "stood", lambda of, poses, floor: lowest.append(floor) or np.tile(pose, (len(poses), 1)))
+    of, found = found_in(pose, rng)
+    assert actor.apart(of, found.best, pose)[0] < 0.01
+    assert lowest == [pytest.approx(0.0, abs=0.05)]
+
+
+def test_furniture_in_the_silhouettes_draws_no_limbs_out_of_them(rng):
+    """A block under a seat and a back, which are in the hull, too."""
+    of, cameras, heading = actor.body(), actor.cameras(3), 0.3
+    pose = actor.stance(of.skeleton, 0.0, heading)
+    legs = of.skeleton.dof_indices(["left_hip_y", "right_hip_y", "left_knee_flexion", "right_knee_flexion"])
+    pose[legs] = np.radians([-85, -85, 88, 88])
+    masks, pelvis = actor.masks(of, pose, 3), of.points(pose[None], names=["pelvis"])[0, 0]
+    turn = np.array([[np.cos(heading), np.sin(heading), 0], [-np.sin(heading), np.cos(heading), 0], [0, 0, 1]])
+    for box in (((-0.18, 0.18), (-0.18, 0.18), (-0.5, -0.12)), ((-0.24, -0.17), (-0.18, 0.18), (-0.5, 0.3))):
+        corners = np.stack(np.meshgrid(*box), -1).reshape(-1, 3) @ turn + pelvis
         for camera, mask in zip(cameras, masks, strict=True):
             mask |= filled(camera.project(corners), mask.shape)
-    surface = actor.hull(3).points(masks)
-    observation, refiner = MultiviewObservation(BodyInViews(of, cameras), surface, masks), Refiner(of)
+    observation, refiner = MultiviewObservation(BodyInViews(of, cameras), actor.hull(3).points(masks), masks), Refiner(of)
 
     def weigh(poses):
         costs = refiner.costs(poses, observation.full) + 0.1 * observation.mismatch(poses)
         return costs, -costs / 1e-5
 
     found = search(rng, of, refiner, observation, None, weigh, 8)
-    assert actor.apart(of, found.best, pose)[0] < 0.15
-
-
-def turned(angle: float) -> np.ndarray:
-    return np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    assert found.costs[0] < 1.05 * weigh(pose[None])[0][0]
 
 
 def filled(corners, shape) -> np.ndarray:
-    """The convex hull of pixels (K, 2) as a mask."""
+    """The convex hull of pixels (K, 2) as a mask of a shape (H, W)."""
     import cv2
 
     out = np.zeros(shape, np.uint8)
