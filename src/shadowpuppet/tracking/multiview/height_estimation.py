@@ -27,9 +27,9 @@ RATIO, FRAMES = 1.09, 5
 """Ratio of neighbouring heights that are tried, and number of frames they are tried on."""
 LONGEST = 1.3
 """Height over the longest extent of the hull, at most: of those who sit or kneel upright."""
-OUTSIDE = 0.05
-"""Weight (m^2) of the share of the drawn body that is outside the silhouettes, of all cameras but the worst. Furniture that the silhouettes
-contain makes large bodies fit; furniture that hides the person hides them from one camera most."""
+OUTSIDE = 0.3
+"""Weight (m^2) of the share of the limbs that is outside two silhouettes or more: clothes, and furniture that the silhouettes contain, make
+large bodies fit, up to the walls of the hull."""
 PENALTY, DEVIATION = 0.02, 0.1
 """Relative cost of a height that deviates from the average by `DEVIATION` (m), that of adults in ANSUR II (Gordon et al. 2014), women and
 men together; it grows with the square, and is bounded for the sake of children."""
@@ -84,8 +84,7 @@ def _misfit(rng: np.random.Generator, tracker: MultiviewTracker, points: Surface
     state = tracker.start(rng, points, masks)
     if state.status == "absent":
         return np.inf
-    outside = np.sort(MultiviewObservation(tracker.views, points, masks).outside(state.pose))
-    return state.cost + OUTSIDE * float(outside[:-1].sum()) / max(len(outside), 1)
+    return state.cost + OUTSIDE * MultiviewObservation(tracker.views, points, masks).outside(state.pose)
 
 
 def lowest_point(before: float, here: float, after: float) -> float:

@@ -153,6 +153,19 @@ def _sphere_distances(T, spheres, space, c, distances):  # pragma: no cover
         own[1], own[2], own[3] = along, down, -(along * u + down * v)
 
 
+def reach(T: Array, spheres: Spheres, space: FreeSpace) -> Array:
+    """How far (m) K spheres under transforms T (J, 3, 4) reach out of C silhouettes, (C, K); -inf outside the pictures."""
+    distances = np.empty((len(space.windows), len(spheres.radii), 4))
+    _fill_reach(np.ascontiguousarray(T), spheres, space, distances)
+    return distances[:, :, 0]
+
+
+@kernel
+def _fill_reach(T, spheres, space, distances):  # pragma: no cover
+    for c in range(space.windows.shape[0]):
+        _sphere_distances(T, spheres, space, c, distances[c])
+
+
 @kernel
 def push_inside(T, spheres, space, distances, weight, origin, sums, adding):  # pragma: no cover
     """Cost of spheres under transforms T (J, 3, 4) that reach out of silhouettes: `weight` times the squared distances (m^2), linear beyond
