@@ -109,6 +109,6 @@ def test_limbs_are_outside_that_two_silhouettes_lack(stage):
         far = np.min([np.hypot(columns - x, rows - y) for x, y in np.linspace(*ends, 9)], 0)
         cut.append(mask & (far > 0.1 * camera.matrix[0, 0] / 3))
     none, one, two = (MultiviewObservation(stage, surface, [*cut[:n], *masks[n:]]).outside(pose) for n in range(3))
-    assert none == one < 0.02  # of pixels' errors
-    assert one + 0.01 < two < 0.3
+    assert none <= one < 0.04  # of errors of pixels
+    assert one + 0.02 < two < 0.3
     assert MultiviewObservation(stage, surface, [cut[0], *(None,) * (len(masks) - 1)]).outside(pose) == 0
