@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.body.whole_body import anatomical
+from shadowpuppet.errors import NOTED
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
@@ -132,6 +133,22 @@ def test_silhouettes_of_films_that_have_lost_detail_hold_the_body_less(untaught,
     person_rig.fit_multiview(np.random.default_rng(0), survey_rig(open_rig(untaught, options), options), options)
     assert (used[0].gauss_newton.emptiness, used[0].silhouettes) == pytest.approx((emptiness, silhouettes))
     assert for_smeared(options.multiview, 0.0) is options.multiview
+
+
+def test_an_estimated_height_is_doubted_where_the_body_fits_badly():
+    assert person_rig._doubts(1.8, 0.85) == ()
+    (said,) = person_rig._doubts(1.83, 0.72)
+    assert "height, 1.83 m, may be off by 20 cm: the body overlaps the silhouettes by 0.72 only" in said
+    assert (said.short, said.weight) == ("height is uncertain: give --height", NOTED)
+    assert len(said.short.split()) <= 10
+
+
+def test_only_a_height_that_was_estimated_is_doubted(recording, untaught, monkeypatch):
+    monkeypatch.setattr(person_rig, "SURE_OVERLAP", 2.0)
+    for path, options, number in ((recording, {}, 0), (untaught, {"height": 1.75}, 0), (untaught, {}, 1)):
+        set_to = make_options(QUICK | options)
+        fitted = person_rig.fit_multiview(np.random.default_rng(0), survey_rig(open_rig(path, set_to), set_to), set_to)
+        assert len(fitted.doubts) == number
 
 
 # Options as a user types them -----------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.tracking.multiview import bundle_adjustment
 from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, make_cloud
+from shadowpuppet.tracking.multiview.refinement.free_space import free_space
 from shadowpuppet.tracking.multiview.settings import SurfaceSettings
 
 MEAN = actor.sizes()
@@ -76,7 +77,7 @@ def test_a_step_is_that_of_all_equations_at_once(damping, rng):
     start, pull, sizes = poses + 0.01 * rng.normal(size=poses.shape), rng.uniform(0, 0.1, poses.shape), rng.normal(size=6)
     free, tight, strain, scale = np.array([0, 2, 3, 5]), rng.uniform(0.1, 1, K), rng.normal(size=K), 1e3
     solution = bundle_adjustment._Solution((sizes, poses), 0.0, frames, strain, body)
-    found = bundle_adjustment._moved(solution, free, tight, scale, start, pull, damping)
+    found = bundle_adjustment._moved(solution, free, np.diag(tight), scale, start, pull, damping)
     A, b = np.zeros((F * D + K, F * D + K)), np.zeros(F * D + K)
     last = F * D + np.arange(K)
     for f, frame in enumerate(frames):
@@ -211,6 +212,74 @@ def test_sizes_may_begin_elsewhere_than_where_they_are_expected():
     assert begun.sizes == true
     found = solve_bundle(anatomical, MEAN, SPREAD, near, clouds, first=true)
     assert off(found.sizes, GIRTHS).sum() < 0.4 * off(MEAN, GIRTHS).sum()
+
+
+def test_deviations_that_sizes_share_are_those_of_their_covariance(rng):
+    spread, shared = rng.uniform(0.01, 0.1, 7), rng.normal(0, 0.05, (2, 7))
+    np.testing.assert_allclose(bundle_adjustment._precision(spread, shared), np.linalg.inv(np.diag(spread**2) + shared.T @ shared))
+    spread[[1, 4]] = 0
+    found, free = bundle_adjustment._precision(spread, shared), np.flatnonzero(spread)
+    both = np.diag(spread[free] ** 2) + shared[:, free].T @ shared[:, free]
+    np.testing.assert_allclose(found[np.ix_(free, free)], np.linalg.inv(both))
+    assert not found[[1, 4]].any()
+    np.testing.assert_array_equal(bundle_adjustment._precision(spread, None), np.diag([0 if s == 0 else 1 / s**2 for s in spread]))
+
+
+def test_whoever_is_taller_than_expected_is_taller_all_over():
+    """Where sizes share a stature, few points suffice to move them together."""
+    tall = anatomical(AnatomicalSizes.from_array(1.08 * MEAN.to_array()))
+    poses, close = shown()[1], SPREAD / 8
+    rng = np.random.default_rng(3)
+    clouds = [actor.cloud_of(actor.surface(tall, pose, rng, 30, 0.003)) for pose in poses]
+    alone = solve_bundle(anatomical, MEAN, close, poses, clouds, worth=1.0)
+    together = solve_bundle(anatomical, MEAN, close, poses, clouds, worth=1.0, shared=0.06 * MEAN.to_array()[None])
+    grown = [np.array([getattr(found.sizes, name) / getattr(MEAN, name) for name in ("thigh_length", "shank_length", "lumbar_height")])
+             for found in (alone, together)]
+    assert grown[1].min() > 1.05
+    assert grown[0].max() < 1.03
+
+
+@pytest.mark.kernels
+def test_limbs_that_reach_out_of_silhouettes_cost_what_their_equations_say(rng):
+    """The gradient in the pose and in the sizes beside numeric derivatives of the cost."""
+    body, pose = actor.body(), actor.stance(actor.body().skeleton)
+    space = free_space(list(zip(actor.cameras(3), actor.masks(body, pose, 3), strict=True)))
+    other = body.skeleton.clamp((pose + rng.normal(0, 0.2, len(pose)))[None])[0]
+    nothing, mean, origin = make_cloud(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)), MEAN.to_array(), np.zeros(3)
+    free = np.array([NAMES.index(name) for name in ("thigh_length", "forearm_length", "thorax_height")])
+    lengths = actor.limbs_of(anatomical(MEAN)).lengths
+
+    def cost(at, sizes) -> float:
+        model = bundle_adjustment._model(anatomical(AnatomicalSizes.from_array(sizes)), lengths)
+        return float(bundle_adjustment._reaching(model, at, space, 2.0, origin)[8].sum())
+
+    nudged = bundle_adjustment._nudged(anatomical, AnatomicalSizes, mean, free)
+    frame = bundle_adjustment._equations(bundle_adjustment._model(anatomical(MEAN)), nudged, other, nothing, SurfaceSettings(), space, 2.0)
+    numeric = [(cost(other + step, mean) - cost(other - step, mean)) / 2e-3 for step in 1e-3 * np.eye(len(other))]
+    numeric += [(cost(other, mean + step) - cost(other, mean - step)) / 2e-3 for step in 1e-3 * np.eye(len(mean))[free]]
+    assert frame.cost == pytest.approx(cost(other, mean))
+    assert np.linalg.norm(numeric) > 1e-4
+    assert np.linalg.norm(np.array(numeric) + 2 * frame.gradient) < 0.15 * np.linalg.norm(numeric)
+
+
+def test_bones_do_not_grow_into_empty_space_nor_shrink_for_one_camera():
+    """Shanks taken to be too long, and of which no points are seen: silhouettes hold them, but not one that lacks a leg."""
+    body, poses = anatomical(MEAN), actor.walk(actor.body().skeleton, 3, 4.0)
+    rng, long = np.random.default_rng(4), MEAN.with_values(shank_length=1.2 * MEAN.shank_length)
+    seen = [actor.surface(body, pose, rng, 30) for pose in poses]
+    clouds = [make_cloud(each.points[high], each.normals[high], each.weights[high]) for each in seen for high in [each.points[:, 2] > 0.45]]
+    masks = [actor.masks(body, pose, 3) for pose in poses]
+    spread = np.where(np.array(NAMES) == "shank_length", 0.1, 0.0)
+
+    def shank(expected, *emptiness) -> float:
+        spaces = [free_space(list(zip(actor.cameras(3), row, strict=True))) for row in masks]
+        return solve_bundle(anatomical, expected, spread, poses, clouds, pull=1.0, spaces=spaces, emptiness=emptiness[0]).sizes.shank_length
+
+    assert shank(long, 0.0) > 1.15 * MEAN.shank_length
+    assert shank(long, 2.0) < 1.12 * MEAN.shank_length
+    for row in masks:
+        row[0][np.flatnonzero(row[0].any(1))[-60:]] = False
+    assert shank(MEAN, 2.0) > 0.98 * MEAN.shank_length
 
 
 def test_sizes_stay_possible_whatever_the_points_say(rng):

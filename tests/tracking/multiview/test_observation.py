@@ -95,3 +95,20 @@ def test_no_points_make_an_empty_cloud(stage):
     cloud = MultiviewObservation(stage, NOTHING, [None] * 5).full
     assert (len(cloud.rows), cloud.total) == (0, 0.0)
     assert np.isfinite(cloud.origin).all()
+
+
+def test_limbs_are_outside_that_two_silhouettes_lack(stage):
+    """Here of the left forearm; one silhouette alone may have a hole."""
+    surface, masks = actor.filmed()[1][0]
+    pose, of = actor.filmed()[0][0], actor.body()
+    arm = [of.points(pose[None], names=[f"left_{joint}"])[0, 0] for joint in ("elbow", "wrist")]
+    cut = []
+    for camera, mask in zip(actor.cameras(), masks, strict=True):
+        rows, columns = np.indices(mask.shape)
+        ends = camera.project(np.array(arm))
+        far = np.min([np.hypot(columns - x, rows - y) for x, y in np.linspace(*ends, 9)], 0)
+        cut.append(mask & (far > 0.1 * camera.matrix[0, 0] / 3))
+    none, one, two = (MultiviewObservation(stage, surface, [*cut[:n], *masks[n:]]).outside(pose) for n in range(3))
+    assert none <= one < 0.04  # of errors of pixels
+    assert one + 0.02 < two < 0.3
+    assert MultiviewObservation(stage, surface, [cut[0], *(None,) * (len(masks) - 1)]).outside(pose) == 0

@@ -9,7 +9,7 @@ import pytest
 from shadowpuppet.body.models import WHOLE
 from shadowpuppet.tracking.multiview import pose_search
 from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation
-from shadowpuppet.tracking.multiview.pose_search import HEADINGS, place_postures, search
+from shadowpuppet.tracking.multiview.pose_search import HEADINGS, place_postures, search, stood
 from shadowpuppet.tracking.multiview.posture_prior import usual_postures
 from shadowpuppet.tracking.multiview.proposals import GLOBAL_DOFS
 from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
@@ -32,6 +32,17 @@ def test_postures_are_placed_where_the_points_are_in_all_directions(name):
     np.testing.assert_allclose(np.average(middles, 1, areas), np.tile(middle, (len(found), 1)), atol=1e-9)
     facing = found[HEADINGS // 2]
     assert facing[root[3]] == pytest.approx(0)
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_postures_are_stood_on_the_floor(name):
+    of = actor.body(name)
+    poses = place_postures(of, usual_postures(of.skeleton)[:40], np.zeros(3))
+    found, limbs = stood(of, poses, 0.2), actor.limbs_of(of)
+    up = of.skeleton.dof_names.index("root_z")
+    np.testing.assert_array_equal(np.delete(found, up, 1), np.delete(poses, up, 1))
+    axes = np.stack([of.skeleton.points(found, limbs.joints, places)[..., 2] for places in (limbs.starts, limbs.ends)], -1)
+    np.testing.assert_allclose((axes - limbs.radii.min(2)).min((1, 2)), 0.2)
 
 
 def found_in(pose, rng, number: int = 4, name: str = "anatomical", library=None, facing=None):
@@ -114,3 +125,43 @@ def test_as_many_are_given_as_asked_for_and_the_same_seed_finds_the_same(number)
     assert one.poses.shape == (number, 32)
     for a, b in zip(one, other):
         np.testing.assert_array_equal(a, b)
+
+
+def test_postures_on_the_floor_are_tried_too(monkeypatch, rng):
+    pose, lowest = actor.stance(actor.body().skeleton, 0.3, 1.0), []
+    monkeypatch.setattr(pose_search, "place_postures", lambda of, some, middle: place_postures(of, some, middle + 5.0))
+    monkeypatch.setattr(pose_search, "stood", lambda of, poses, floor: lowest.append(floor) or np.tile(pose, (len(poses), 1)))
+    of, found = found_in(pose, rng)
+    assert actor.apart(of, found.best, pose)[0] < 0.01
+    assert lowest == [pytest.approx(0.0, abs=0.05)]
+
+
+def test_furniture_in_the_silhouettes_draws_no_limbs_out_of_them(rng):
+    """A block under a seat and a back, which are in the hull, too."""
+    of, cameras, heading = actor.body(), actor.cameras(3), 0.3
+    pose = actor.stance(of.skeleton, 0.0, heading)
+    legs = of.skeleton.dof_indices(["left_hip_y", "right_hip_y", "left_knee_flexion", "right_knee_flexion"])
+    pose[legs] = np.radians([-85, -85, 88, 88])
+    masks, pelvis = actor.masks(of, pose, 3), of.points(pose[None], names=["pelvis"])[0, 0]
+    turn = np.array([[np.cos(heading), np.sin(heading), 0], [-np.sin(heading), np.cos(heading), 0], [0, 0, 1]])
+    for box in (((-0.18, 0.18), (-0.18, 0.18), (-0.5, -0.12)), ((-0.24, -0.17), (-0.18, 0.18), (-0.5, 0.3))):
+        corners = np.stack(np.meshgrid(*box), -1).reshape(-1, 3) @ turn + pelvis
+        for camera, mask in zip(cameras, masks, strict=True):
+            mask |= filled(camera.project(corners), mask.shape)
+    observation, refiner = MultiviewObservation(BodyInViews(of, cameras), actor.hull(3).points(masks), masks), Refiner(of)
+
+    def weigh(poses):
+        costs = refiner.costs(poses, observation.full) + 0.1 * observation.mismatch(poses)
+        return costs, -costs / 1e-5
+
+    found = search(rng, of, refiner, observation, None, weigh, 8)
+    assert found.costs[0] < 1.05 * weigh(pose[None])[0][0]
+
+
+def filled(corners, shape) -> np.ndarray:
+    """The convex hull of pixels (K, 2) as a mask of a shape (H, W)."""
+    import cv2
+
+    out = np.zeros(shape, np.uint8)
+    cv2.fillConvexPoly(out, cv2.convexHull(np.rint(corners).astype(np.int32)), 1)
+    return out.view(bool)

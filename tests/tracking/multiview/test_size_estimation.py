@@ -3,32 +3,36 @@
 from __future__ import annotations
 
 import functools
-import types
 from functools import partial
 
 import actor
 import numpy as np
 import pytest
 
+from shadowpuppet.body.anthropometry import SOLE, stature_of
 from shadowpuppet.body.models import WHOLE, average_sizes, make_body, shares_of
 from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.errors import TrackingError
+from shadowpuppet.tracking.multiview import size_estimation
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.size_estimation import (
+    CLOTHES,
     JOINT_DEVIATION,
     SIZES_FROM_JOINTS,
-    estimate_height,
+    STATURE_DEVIATION,
+    dressed,
     estimate_sizes,
-    observed_height,
+    shared_deviations,
     size_deviations,
 )
-from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
 SETTINGS = MultiviewSettings(particles=8)
 NAMES = AnatomicalSizes.names()
 GIRTHS = {"thigh_width": 1.25, "waist_depth": 1.35, "waist_width": 1.2, "pelvis_width": 1.2, "pelvis_depth": 1.2, "upper_arm_width": 1.2}
 MEAN = actor.sizes()
+WIDTHS = ("width", "depth", "thickness")
 
 
 @functools.cache
@@ -107,38 +111,19 @@ def test_a_person_in_a_few_frames_only_is_taken_as_expected():
     assert np.isnan(found.residual)
 
 
-@pytest.mark.parametrize(("extent", "fits", "shares", "best"), [
-    (0.55, 1.1, [0.93, 1.0, 1.08, 1.2], 1.2),
-    (1.02, 1.1, [0.8, 0.86, 0.93, 1.0, 1.08, 1.2], 1.08),
-    (2.4, 1.1, [0.8, 0.86, 0.93, 1.0], 0.8),
-    (1.8, None, [0.8, 0.86, 0.93, 1.0, 1.08, 1.2], 0.93),  # all fit: the usual one
-])
-def test_possible_heights_near_the_extent_are_tried(monkeypatch, extent, fits, shares, best):
-    tried, nobody = [], points([])
+def test_who_is_found_in_a_later_frame_is_followed_back_to_the_first():
+    first, seen = stout()[2], []
 
-    class Tracker:
-        def __init__(self, height, cameras, settings):
-            tried.append(height)
-            self.cost = 1.0 if fits is None else abs(height - fits)
+    class Watched(MultiviewTracker):
+        def start(self, rng, points, masks, also=None):
+            seen.append(masks)
+            return super().start(rng, points, masks, also)
 
-        def start(self, rng, cloud, masks):
-            return types.SimpleNamespace(cost=1e9 if cloud is nobody else self.cost, status="absent" if cloud is nobody else "tracked")
-
-    monkeypatch.setattr("shadowpuppet.tracking.multiview.size_estimation.MultiviewTracker", Tracker)
-    first = [(points(np.linspace(0, extent, 400)), ())] * 9 + [(nobody, ())] * 9
-    seen = observed_height(first)
-    assert seen is not None
-    assert height_of(first) == pytest.approx(best * seen)
-    np.testing.assert_allclose(tried, np.array(shares) * seen)
-
-
-def height_of(first) -> float | None:
-    return estimate_height(np.random.default_rng(0), lambda height: height, (), first, SETTINGS)
-
-
-def test_where_nobody_or_a_giant_is_seen_no_height_is_found():
-    assert height_of([(points([]), ())]) is None
-    assert height_of([(points(np.linspace(0, 9.0, 400)), ())]) is None
+    tracker = Watched(anatomical(stout()[0]), tuple(actor.cameras()), SETTINGS)
+    found = size_estimation._followed(np.random.default_rng(0), tracker, first, 3)
+    assert {n for n, _ in found} >= set(range(1, len(first)))
+    assert seen[0] is first[3][1]
+    assert actor.apart(tracker.body, np.array([state.pose for _, state in found]), stout()[1]).max() < 0.05
 
 
 # What is known before -------------------------------------------------------------------------------------------------
@@ -156,15 +141,14 @@ def test_bones_that_joints_show_are_sharp_and_all_else_as_people_differ(name):
     assert set(SIZES_FROM_JOINTS) >= {"thigh_length", "forearm_length", "hip_distance"}
 
 
-def points(z) -> SurfacePoints:
-    z = np.asarray(z, float)
-    return SurfacePoints(np.column_stack([0 * z, 0 * z, z]), np.zeros((len(z), 3)), np.ones(len(z)), np.zeros(len(z), np.int64))
-
-
-def test_who_stands_tallest_is_as_tall_as_seen():
-    standing, bowed, nobody = points(np.linspace(0.02, 1.75, 400)), points(np.linspace(0, 1.1, 400)), points([])
-    assert observed_height([(standing, ())] * 3 + [(bowed, ())] * 7 + [(nobody, ())] * 20) == pytest.approx(1.72, abs=0.03)
-    stray = points([*np.linspace(0.0, 1.7, 400), -3.0, 9.0])
-    assert observed_height([(stray, ())]) == pytest.approx(1.7, abs=0.03)
-    assert observed_height([(nobody, ()), (points(np.arange(40)), ())]) is None
-    assert observed_height([]) is None
+@pytest.mark.parametrize("name", WHOLE)
+def test_dressed_people_are_wider_and_no_taller(name):
+    sizes = average_sizes(name, 1.7)
+    worn = dressed(sizes)
+    for size in sizes.names():
+        factor = CLOTHES if size.split("_")[-1] in WIDTHS else 1
+        assert getattr(worn, size) == pytest.approx(factor * getattr(sizes, size)), size
+    girth, stature = shared_deviations(worn, tall=True)
+    np.testing.assert_array_equal(shared_deviations(worn, tall=False), [girth])
+    assert stature_of(dict(zip(sizes.names(), sizes.to_array() + stature))) == pytest.approx(1.7 - SOLE + STATURE_DEVIATION)
+    np.testing.assert_array_equal(girth > 0, [size.split("_")[-1] in WIDTHS for size in sizes.names()])

@@ -28,6 +28,7 @@ from shadowpuppet.tracking.multiview.refinement.correspondence import (
     part_constants,
     place_parts,
 )
+from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, Spheres, rows_inside, spheres_in
 from shadowpuppet.tracking.multiview.settings import SurfaceSettings
 
 Measured = TypeVar("Measured", bound=Sizes)
@@ -53,31 +54,46 @@ class Bundle(Generic[Measured]):
 
 def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array, poses: Array, clouds: Sequence[Cloud],
                  settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float | Array = 1e-6, centre: Array | None = None,
-                 first: Measured | None = None, worth: float = INDEPENDENT_POINTS) -> Bundle[Measured]:
+                 first: Measured | None = None, worth: float = INDEPENDENT_POINTS, shared: Array | None = None,
+                 spaces: Sequence[FreeSpace] = (), emptiness: float = 0.0) -> Bundle[Measured]:
     """Sizes and poses that fit the surface points of F frames, by damped Gauss-Newton from poses (F, D) and sizes `first` or `expected`.
 
-    `spread` (K,): standard deviations (m) of the expected sizes, 0 for fixed ones. `pull`, one or (F, D): weight of the squared distance
+    `spread` (K,): standard deviations (m) of the expected sizes, 0 for fixed ones. `shared` (S, K): deviations that sizes have together,
+    each row for one standard deviation of a common cause, such as the stature. `spaces`, one per frame, and `emptiness`: silhouettes that
+    limbs must not reach out of, as in `Pass`. `pull`, one or (F, D): weight of the squared distance
     from `centre` (F, D; default: `poses`), as in `Refiner.gauss_newton`. `worth`: effective number of independent points per frame.
     """
     settings, start, about = settings or SurfaceSettings(), poses if centre is None else centre, expected.to_array()
     pull = np.broadcast_to(pull, poses.shape)
     free, scale = np.flatnonzero(spread > 0), worth / POINT_NOISE**2
+    tight = _precision(spread, shared)[np.ix_(free, free)]
     at, damping, best = ((about if first is None else first.to_array()), poses), 1e-2, None
     for turn in range(rounds + 1):
         body, nudged = make(type(expected).from_array(at[0])), _nudged(make, type(expected), at[0], free)
         model = _model(body)
-        frames = [_equations(model, nudged, pose, cloud, settings) for pose, cloud in zip(at[1], clouds, strict=True)]
-        strain = (at[0] - about)[free] / spread[free]
-        cost = scale * (sum(frame.cost for frame in frames) + (pull * (at[1] - start) ** 2).sum()) + (strain**2).sum()
+        frames = [_equations(model, nudged, pose, cloud, settings, space, emptiness)
+                  for pose, cloud, space in zip(at[1], clouds, spaces or [None] * len(clouds), strict=True)]
+        off = (at[0] - about)[free]
+        cost = scale * (sum(frame.cost for frame in frames) + (pull * (at[1] - start) ** 2).sum()) + off @ tight @ off
         better = best is None or cost < best.cost
         damping *= 0.3 if better else 8
         if best is None or better:
-            best = _Solution(at, cost, frames, strain / spread[free], body)
+            best = _Solution(at, cost, frames, tight @ off, body)
         if turn < rounds:
-            at = _moved(best, free, 1 / spread[free] ** 2 / scale, scale, start, pull, damping)
+            at = _moved(best, free, tight / scale, scale, start, pull, damping)
     assert best is not None
     residual = np.sqrt(np.mean([frame.squared for frame in best.frames]))
     return Bundle(type(expected).from_array(best.at[0]), best.at[1], float(residual))
+
+
+def _precision(spread: Array, shared: Array | None) -> Array:
+    """Inverse covariance (K, K) of sizes that deviate by `spread` (K,) each and by `shared` (S, K) together; 0 for fixed sizes."""
+    alone = np.zeros(len(spread))
+    alone[spread > 0] = 1 / spread[spread > 0] ** 2
+    if shared is None or not len(shared):
+        return np.diag(alone)
+    weighed = shared * alone  # Woodbury's identity
+    return np.diag(alone) - weighed.T @ np.linalg.solve(np.eye(len(shared)) + weighed @ shared.T, weighed)
 
 
 class _Model(NamedTuple):
@@ -88,11 +104,12 @@ class _Model(NamedTuple):
     rotations: Array
     starts: Array
     parts: Single
+    spheres: Spheres
     reach: NDArray[np.bool_]
     """Whether a DOF moves a joint, of shape (D, J)."""
 
 
-def _model(body: Body) -> _Model:
+def _model(body: Body, lengths: Array | None = None) -> _Model:
     skeleton, limbs = body.skeleton, body.limbs
     assert limbs is not None
     parents = skeleton.tree[0]
@@ -102,7 +119,7 @@ def _model(body: Body) -> _Model:
             above[:, j] |= above[:, parent]
     chain = make_chain(skeleton)
     return _Model(chain, limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts), part_constants(limbs),
-                  above[chain.owners])
+                  spheres_in(limbs, lengths), above[chain.owners])
 
 
 class _Frame(NamedTuple):
@@ -130,14 +147,16 @@ class _Solution(NamedTuple):
 
 def _nudged(make: Callable[[Measured], Body], kind: type[Measured], at: Array, free: NDArray[np.int64]) -> list[_Model]:
     """Bodies, one per free size, in which that size is larger by `SIZE_STEP`."""
-    return [_model(make(kind.from_array(at + SIZE_STEP * (np.arange(len(at)) == k)))) for k in free]
+    limbs = make(kind.from_array(at)).limbs
+    assert limbs is not None
+    return [_model(make(kind.from_array(at + SIZE_STEP * (np.arange(len(at)) == k))), limbs.lengths) for k in free]
 
 
 def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float, start: Array, pull: Array,
            damping: float) -> tuple[Array, Array]:
     """Sizes and poses after a step: the poses are eliminated (Schur complement), the sizes solved for, the poses substituted back."""
     D, K = start.shape[1], len(free)
-    total, right, parts = np.diag(tight * (1 + damping)), -best.strain / scale, []
+    total, right, parts = tight + damping * np.diag(np.diag(tight)), -best.strain / scale, []
     for frame, pose, first, held in zip(best.frames, best.at[1], start, pull, strict=True):
         H, g = frame.rows.copy(), frame.gradient.copy()
         H[np.arange(D), np.arange(D)] += held
@@ -156,7 +175,8 @@ def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float,
     return sizes, best.body.skeleton.clamp(best.at[1] + np.clip(moves, -MAX_POSE_STEP, MAX_POSE_STEP))
 
 
-def _equations(model: _Model, nudged: list[_Model], pose: Array, cloud: Cloud, settings: SurfaceSettings) -> _Frame:
+def _equations(model: _Model, nudged: list[_Model], pose: Array, cloud: Cloud, settings: SurfaceSettings, space: FreeSpace | None = None,
+               emptiness: float = 0.0) -> _Frame:
     """A frame's normal equations in its pose and the sizes."""
     near = np.zeros((len(cloud.rows), 3 * LANES), np.float32)
     screws, out = _measured(model, pose, cloud, settings, near, True)
@@ -167,7 +187,32 @@ def _equations(model: _Model, nudged: list[_Model], pose: Array, cloud: Cloud, s
     rows = np.concatenate([moves, np.transpose(grows).reshape(len(moves), len(nudged))], 1)
     weighed = rows * weights[:, None]
     squared = float(weights @ distances**2 / max(weights.sum(), 1e-9))
-    return _Frame(float(out[8].sum()) / max(cloud.total, 1e-9), squared, rows.T @ weighed, weighed.T @ distances)
+    frame = _Frame(float(out[8].sum()) / max(cloud.total, 1e-9), squared, rows.T @ weighed, weighed.T @ distances)
+    return frame if space is None else _within(frame, model, nudged, pose, screws, space, emptiness, cloud.origin)
+
+
+def _within(frame: _Frame, model: _Model, nudged: list[_Model], pose: Array, screws: Array, space: FreeSpace, emptiness: float,
+            origin: Array) -> _Frame:
+    """A frame's equations with those of limbs that reach out of silhouettes. `screws` (D, 6): about the `origin` (3,)."""
+    out = _reaching(model, pose, space, emptiness, origin)
+    used = np.flatnonzero(out[1] > 0)
+    distances, weights = out[0, used], out[1, used]
+    joints = np.tile(model.spheres.joints, len(space.windows))[used]
+    moves = (out[2:8, used].T @ screws.T) * model.reach[:, joints].T
+    grows = [(distances - _reaching(other, pose, space, emptiness, origin)[0, used]) / SIZE_STEP for other in nudged]
+    rows = np.concatenate([moves, np.transpose(grows).reshape(len(moves), len(nudged))], 1)
+    weighed = rows * weights[:, None]
+    return frame._replace(cost=frame.cost + float(out[8].sum()), rows=frame.rows + rows.T @ weighed,
+                          gradient=frame.gradient + weighed.T @ distances)
+
+
+def _reaching(model: _Model, pose: Array, space: FreeSpace, emptiness: float, origin: Array) -> Array:
+    """What `rows_inside` says of a pose (D,), (9, C K)."""
+    T, number = np.zeros((len(model.chain.parents), 3, 4)), len(model.spheres.radii)
+    place_one(pose, model.chain, T, np.zeros((len(pose), 6)), np.zeros((3, 3, 3)))
+    out = np.zeros((9, len(space.windows) * number))
+    rows_inside(T, model.spheres, space, np.empty((len(space.windows), number, 4)), emptiness, origin, out)
+    return out
 
 
 def _measured(model: _Model, pose: Array, cloud: Cloud, settings: SurfaceSettings, near: Single, associate: bool) -> tuple[Array, Array]:

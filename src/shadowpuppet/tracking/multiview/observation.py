@@ -14,9 +14,12 @@ from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, make_cloud
-from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, free_space
+from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, free_space, reach, spheres_in
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.silhouette_cost import Cost, Observation, silhouette_costs
+
+MARGIN = 0.01
+"""Distance (m) by which a limb is outside a silhouette, beyond its pixels' errors."""
 
 
 class BodyInViews:
@@ -24,7 +27,8 @@ class BodyInViews:
 
     def __init__(self, body: Body, cameras: Sequence[Camera]) -> None:
         """`cameras`: calibrated, with known poses in the world."""
-        self.body = body
+        assert body.limbs is not None
+        self.body, self.limbs = body, body.limbs
         self.pictures = tuple(Picture(body, _half_size(camera), camera.T_camera_world) for camera in cameras)
 
 
@@ -82,6 +86,14 @@ class MultiviewObservation:
         """Pixels in which drawn poses (N, D) and silhouettes differ (Liu 2011, eq. 2), as shares (N,) of the silhouettes' area."""
         differing = [silhouette_costs(picture, observation, poses) for picture, observation in self.silhouettes]
         return sum(differing, np.zeros(len(poses))) / max(self.area, 1)
+
+    def outside(self, pose: Array) -> float:
+        """Share of the spheres along the limbs of a pose (D,) that reach out of two silhouettes or more; of one alone a limb may be hidden
+        by furniture."""
+        if len(self.people) < 2:
+            return 0.0
+        spheres, T = spheres_in(self.views.limbs), self.views.body.skeleton.forward(pose[None])[0]
+        return float((np.sort(reach(T, spheres, self.space), axis=0)[-2] > MARGIN).mean())
 
     def overlaps(self, pose: Array) -> Array:
         """Intersection over union of a drawn pose (D,) and the silhouette of each camera, (C,); NaN where no person is visible."""

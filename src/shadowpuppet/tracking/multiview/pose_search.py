@@ -15,7 +15,7 @@ from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms, usual_postures
-from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
+from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refiner
 from shadowpuppet.tracking.particle_filter import Particles, Weigh, best_of, evaluate
 
 HEADINGS = 16
@@ -29,6 +29,10 @@ FINE_STAGES = ((4, 4, 0.08), (1, 6, 0.05))
 """Stages of refinement: stride of the points, iterations, robust scale (m)."""
 ARM_ROUNDS, ARM_SAMPLES, ARM_SPREAD = 2, 600, 0.6
 """Number of searches for each arm of the best pose, candidates per search, and their noise about the usual arms (rad)."""
+EMPTINESS = 2.0
+"""Weight of limbs that reach out of the silhouettes (see `Pass`): without it, poses are drawn to furniture that the hull contains."""
+STRAY = 3
+"""Number of the lowest surface points that may be noise."""
 PULL = 1e-4
 """Weight of the pull to the posture before refinement (see `Refiner.gauss_newton`)."""
 
@@ -47,6 +51,7 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
             known = known[np.sort(rng.choice(len(known), MAX_LIBRARY_POSES, replace=False))]
         postures = np.concatenate([known, postures])
     poses = place_postures(body, postures, observation.full.origin)
+    poses = np.concatenate([poses, stood(body, poses, _lowest(observation.surface.points))])
     if facing is not None:
         heading = body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
         poses = poses[np.cos(poses[:, heading] - facing) > 1e-6]
@@ -62,8 +67,8 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
 
 
 def _refined(refiner: Refiner, observation: MultiviewObservation, poses: Array, stages: tuple) -> Array:
-    clouds = tuple((observation.cloud(share), iterations, tau) for share, iterations, tau in stages)
-    return refiner.gauss_newton(poses, clouds, poses, np.full(poses.shape[1], PULL))
+    passes = tuple(Pass(observation.cloud(share), iterations, tau, observation.space, EMPTINESS) for share, iterations, tau in stages)
+    return refiner.gauss_newton(poses, passes, poses, np.full(poses.shape[1], PULL))
 
 
 def _other_arms(rng: np.random.Generator, body: Body, pose: Array, side: str) -> Array:
@@ -87,3 +92,21 @@ def place_postures(body: Body, postures: Array, middle: Array) -> Array:
     areas = limbs.lengths * limbs.radii.mean((1, 2))
     poses[:, place] = middle - (areas[:, None] * middles).sum(1) / areas.sum()
     return poses
+
+
+def stood(body: Body, poses: Array, lowest: float) -> Array:
+    """Poses (N, D) moved up or down so that their lowest limb is at the height `lowest`, metres: beside furniture, the middle of all
+    surface points is not the person's."""
+    limbs = body.limbs
+    assert limbs is not None
+    radii = limbs.radii.min(2)
+    starts, ends = (body.skeleton.points(poses, limbs.joints, places)[..., 2] for places in (limbs.starts, limbs.ends))
+    poses, up = poses.copy(), body.skeleton.dof_indices(GLOBAL_DOFS[2:3])[0]
+    poses[:, up] += lowest - np.minimum(starts - radii[:, 0], ends - radii[:, 1]).min(1)
+    return poses
+
+
+def _lowest(points: Array) -> float:
+    """Height of the lowest of the surface points (P, 3) that are no noise, metres."""
+    heights = np.sort(points[:, 2])
+    return float(heights[min(STRAY, len(heights)) - 1])

@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 from typing import Generic
 
 import numpy as np
+from numpy.typing import NDArray
 
-from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, stature_of
+from shadowpuppet.body.anthropometry import stature_of
 from shadowpuppet.body.models import shares_of
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.sizes import HEIGHTS, BoneSizes
+from shadowpuppet.body.sizes import BoneSizes, Sizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
@@ -44,10 +45,14 @@ SIZE_PULL = 1e-5
 """Weight of the pull of the poses to the tracked ones."""
 OVERLAP_LOSS = 0.06
 """A frame whose overlap is lower than the best by more than this is left out: its pose is wrong."""
-HEIGHT_SHARES, HEIGHT_FRAMES = (0.8, 0.86, 0.93, 1.0, 1.08, 1.2), 5
-"""Heights tried, as shares of the hull's extent, and the number of frames they are tried on."""
-HEIGHT_PENALTY, HEIGHT_DEVIATION = 0.02, 0.1
-"""Relative cost of a height that deviates from the average by `HEIGHT_DEVIATION` (m); it grows with the square."""
+CLOTHES = 1.1
+"""Widths of dressed people over those of average bodies: silhouettes show clothes and hair. Without it, a body whose legs are bent fits
+best if it is drawn 5 to 10 % too large (in made films)."""
+STATURE_DEVIATION, GIRTH_DEVIATION = 0.06, 0.15
+"""Standard deviations of the stature (m) about one that was estimated, and of the relative girth that all widths share."""
+EMPTINESS_SHARE = 0.25
+"""Weight of limbs that reach out of the silhouettes while sizes are solved for, over that of the tracker: bones must neither grow into
+empty space nor shrink where a chair hides them."""
 MIN_FRAMES = 4
 """Smallest number of frames with a person from which sizes are solved."""
 
@@ -77,28 +82,48 @@ def size_deviations(sizes: BoneSizes, shown: bool) -> Array:
     return np.array([JOINT_DEVIATION if shown and name in SIZES_FROM_JOINTS else shares[name][1] * stature for name in sizes.names()])
 
 
+def shared_deviations(sizes: BoneSizes, tall: bool) -> Array:
+    """Deviations (S, K), metres, that the sizes of people have together, as in `solve_bundle`: girth, and stature where `tall`."""
+    values = sizes.to_array()
+    girth = GIRTH_DEVIATION * np.where(_is_width(type(sizes)), values, 0.0)
+    return np.array([girth, STATURE_DEVIATION / stature_of(dict(zip(sizes.names(), values))) * values] if tall else [girth])
+
+
+def dressed(sizes: Measured) -> Measured:
+    """The sizes of a person in clothes: widths and depths larger by `CLOTHES`."""
+    return type(sizes).from_array(sizes.to_array() * np.where(_is_width(type(sizes)), CLOTHES, 1.0))
+
+
+def _is_width(kind: type[Sizes]) -> NDArray[np.bool_]:
+    """Which sizes (K,) are widths, depths or thicknesses."""
+    return np.array([name.endswith(("_width", "_depth", "_thickness")) for name in kind.names()])
+
+
 def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], expected: Measured, spread: Array, cameras: Sequence[Camera],
             first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], settings: MultiviewSettings,
-            library: Array | None = None, looks: int = 0) -> SizeEstimate[Measured]:
+            library: Array | None = None, looks: int = 0, shared: Array | None = None, begin: int = 0) -> SizeEstimate[Measured]:
     """Sizes of the person in the `first` frames (surface points and masks, in order of time), `expected` with standard deviations `spread`
-    (K,). `looks`: number of frames after which what the body does not explain is left out; 0: never. Raises `TrackingError` if no person
-    is found."""
+    (K,), and `shared` (S, K) as in `solve_bundle`. `looks`: number of frames after which what the body does not explain is left out; 0:
+    never. `begin`: frame in which the person is searched for. Raises `TrackingError` if no person is found."""
     plain, sizes, residual = replace(settings, method="hybrid", refinement="gauss_newton"), expected, np.nan
     for _ in range(ROUNDS if (spread > 0).any() else 0):
         tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
-        found = _followed(rng, tracker, first)
+        found = _followed(rng, tracker, first, begin)
         if len(found) < MIN_FRAMES:
             break
         chosen = evenly_spread(len(found), MAX_FRAMES)
         poses = np.array([found[i][1].pose for i in chosen])
-        clouds = [MultiviewObservation(tracker.views, *first[found[i][0]]).cloud(POINT_STRIDE) for i in chosen]
+        seen = [MultiviewObservation(tracker.views, *first[found[i][0]]) for i in chosen]
+        clouds = [each.cloud(POINT_STRIDE) for each in seen]
         pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
         centre, pull = map(np.array, zip(*pulls, strict=True))
         bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
-                              worth=INDEPENDENT_POINTS[settings.body])
+                              worth=INDEPENDENT_POINTS[settings.body], shared=shared,
+                              spaces=() if shared is None else [each.space for each in seen],
+                              emptiness=EMPTINESS_SHARE * settings.gauss_newton.emptiness)
         sizes, residual = bundle.sizes, bundle.residual
     tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
-    found = _followed(rng, tracker, first)
+    found = _followed(rng, tracker, first, begin)
     if not found:
         raise TrackingError(f"nobody is found in the first {len(first)} frames' silhouettes: are they a whole person's, in two cameras or "
                             "more at once, and do the cameras agree? `shadowpuppet info` tells")
@@ -106,29 +131,14 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
                         found[-1][1].pose, found[-1][1].unexplained)
 
 
-def estimate_height(rng: np.random.Generator, make: Callable[[float], Body], cameras: Sequence[Camera],
-                  first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], settings: MultiviewSettings) -> float | None:
-    """Height (m) of the person in the `first` frames: that of several which fits a few frames best; None if no person is visible. The
-    hull's extent alone does not give it: arms may be overhead, or the person may crouch."""
-    extent = observed_height(first)
-    if extent is None:
-        return None
-    plain = replace(settings, method="hybrid", refinement="gauss_newton")
-    chosen = first[:: max(1, len(first) // HEIGHT_FRAMES)][:HEIGHT_FRAMES]
-    costs = []
-    heights = [extent * share for share in HEIGHT_SHARES if HEIGHTS[0] <= extent * share <= HEIGHTS[1]]
-    for height in heights:
-        tracker = MultiviewTracker(make(height), tuple(cameras), plain)
-        found = [tracker.start(rng, points, masks) for points, masks in chosen]
-        unusual = 1 + HEIGHT_PENALTY * ((height - AVERAGE_HEIGHT) / HEIGHT_DEVIATION) ** 2
-        costs.append(unusual * np.mean([state.cost for state in found if state.status != "absent"] or [np.inf]))
-    return heights[int(np.argmin(costs))] if heights else None
-
-
 def _followed(rng: np.random.Generator, tracker: MultiviewTracker,
-              first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]]) -> list[tuple[int, MultiviewState]]:
-    """Indices and states of the frames in which the person is found: tracked, or searched for again if the overlap falls."""
-    state, found, best = None, [], 0.0
+              first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], begin: int) -> list[tuple[int, MultiviewState]]:
+    """Indices and states of the frames in which the person is found: searched for in the frame `begin`, followed from there back to the
+    first one and then through all, and searched for again if the overlap falls."""
+    state, found, best = None, list[tuple[int, MultiviewState]](), 0.0
+    for points, masks in first[begin:0:-1]:
+        state = tracker.start(rng, points, masks) if state is None else tracker.step(rng, state, points, masks)
+    state = None if state is None else state._replace(velocity=np.zeros_like(state.velocity), unexplained=())
     for n, (points, masks) in enumerate(first):
         state = tracker.start(rng, points, masks) if state is None else tracker.step(rng, state, points, masks)
         if state.overlap < best - OVERLAP_LOSS and state.status != "absent":
@@ -139,8 +149,3 @@ def _followed(rng: np.random.Generator, tracker: MultiviewTracker,
             found.append((n, state))
     return [(n, state) for n, state in found if state.overlap > best - OVERLAP_LOSS]
 
-
-def observed_height(first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]]) -> float | None:
-    """The hull's vertical extent, metres, when the person stands tallest; None without points."""
-    extents = [float(np.ptp(np.sort(points.points[:, 2])[2:-2])) for points, _ in first if len(points.points) > 50]
-    return float(np.percentile(extents, 90)) if extents else None

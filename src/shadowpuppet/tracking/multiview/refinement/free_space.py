@@ -27,6 +27,8 @@ TAU = 0.1
 """Distance (m) beyond which the cost grows linearly, not with the square."""
 OUTVOTING_CAMERAS = 3
 """If a sphere's centre is outside one silhouette only and inside at least this many others, the one is ignored: it may lack a limb."""
+TRUSTED_CAMERAS = 2
+"""The same where sizes are solved for: a chair before a limb cuts it off in one silhouette, and the limb must not shrink for it."""
 WINDOW_MARGIN = 24
 """Margin (pixels) around the person in which distances are computed; farther out they are extrapolated."""
 
@@ -59,11 +61,11 @@ class FreeSpace(NamedTuple):
     """Distortion, padded (8); whether fisheye; whether there is any distortion; radius up to which it holds; of shape (C, 11)."""
 
 
-def spheres_in(limbs: Limbs) -> Spheres:
-    """Spheres along each limb's axis, from its start to its end."""
+def spheres_in(limbs: Limbs, lengths: Array | None = None) -> Spheres:
+    """Spheres along each limb's axis, from its start to its end; as many as for limbs of these `lengths` (S,), if given."""
     joints, places, radii, which = [], [], [], []
-    for s, length in enumerate(limbs.lengths):
-        for share in np.linspace(0, 1, max(2, round(length / SPHERE_SPACING) + 1)):
+    for s, (length, own) in enumerate(zip(limbs.lengths, limbs.lengths if lengths is None else lengths, strict=True)):
+        for share in np.linspace(0, 1, max(2, round(own / SPHERE_SPACING) + 1)):
             which.append(s)
             joints.append(limbs.joints[s])
             places.append(limbs.starts[s] + limbs.rotations[s] @ (share * np.array([*limbs.shears[s], length])))
@@ -151,6 +153,19 @@ def _sphere_distances(T, spheres, space, c, distances):  # pragma: no cover
         own[1], own[2], own[3] = along, down, -(along * u + down * v)
 
 
+def reach(T: Array, spheres: Spheres, space: FreeSpace) -> Array:
+    """How far (m) K spheres under transforms T (J, 3, 4) reach out of C silhouettes, (C, K); -inf outside the pictures."""
+    distances = np.empty((len(space.windows), len(spheres.radii), 4))
+    _fill_reach(np.ascontiguousarray(T), spheres, space, distances)
+    return distances[:, :, 0]
+
+
+@kernel
+def _fill_reach(T, spheres, space, distances):  # pragma: no cover
+    for c in range(space.windows.shape[0]):
+        _sphere_distances(T, spheres, space, c, distances[c])
+
+
 @kernel
 def push_inside(T, spheres, space, distances, weight, origin, sums, adding):  # pragma: no cover
     """Cost of spheres under transforms T (J, 3, 4) that reach out of silhouettes: `weight` times the squared distances (m^2), linear beyond
@@ -183,6 +198,40 @@ def push_inside(T, spheres, space, distances, weight, origin, sums, adding):  # 
                 n2 = -(V[0, 2] * own[1] + V[1, 2] * own[2] + V[2, 2] * own[3])
                 _add(n0, n1, n2, p0 - origin[0], p1 - origin[1], p2 - origin[2], share * fade, r, sums[spheres.joints[k]])
     return total
+
+
+@kernel
+def rows_inside(T, spheres, space, distances, weight, origin, out):  # pragma: no cover
+    """Fill out (9, C K), for each camera and sphere as in `push_inside`: the distance (m) by which it reaches out of the silhouette, the
+    weight of its square, moment and normal (6) of the direction inward, and the cost. The cost of one sphere is bounded, so that holes
+    of silhouettes do not decide. `distances` (C, K, 4): work array."""
+    cameras, number = space.windows.shape[0], spheres.radii.size
+    out[:] = 0.0
+    for c in range(cameras):
+        _sphere_distances(T, spheres, space, c, distances[c])
+    for k in range(number):
+        inside = outside = 0
+        for c in range(cameras):
+            middle = distances[c, k, 0] - spheres.radii[k]
+            outside += middle > 0
+            inside += -np.inf < middle <= 0
+        outvoted = outside == 1 and inside >= TRUSTED_CAMERAS
+        p0, p1, p2 = _placed(T[spheres.joints[k]], spheres.places[k])
+        x0, x1, x2 = p0 - origin[0], p1 - origin[1], p2 - origin[2]
+        for c in range(cameras):
+            own, V, at = distances[c, k], space.views[c], c * number + k
+            r = own[0]
+            out[0, at] = max(r, -1.0)  # none outside the picture
+            if r <= 0 or (outvoted and r > spheres.radii[k]):
+                continue
+            bound, share = 1 / (1 + (r / TAU) ** 2), weight / (number * cameras)
+            n0 = -(V[0, 0] * own[1] + V[1, 0] * own[2] + V[2, 0] * own[3])
+            n1 = -(V[0, 1] * own[1] + V[1, 1] * own[2] + V[2, 1] * own[3])
+            n2 = -(V[0, 2] * own[1] + V[1, 2] * own[2] + V[2, 2] * own[3])
+            out[1, at] = share * bound**2
+            out[2, at], out[3, at], out[4, at] = x1 * n2 - x2 * n1, x2 * n0 - x0 * n2, x0 * n1 - x1 * n0
+            out[5, at], out[6, at], out[7, at] = n0, n1, n2
+            out[8, at] = share * bound * r * r
 
 
 @device
