@@ -13,6 +13,7 @@ import made_rig
 import numpy as np
 import pytest
 
+from shadowpuppet.calibration.agreement import SETS_COMPARED
 from shadowpuppet.cli.app import run
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import rigid
@@ -22,6 +23,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.prepare import MULTIVIEW, look_at, prepare
 from shadowpuppet.pipeline.progress import Listener, Steps, json_text
 from shadowpuppet.pipeline.rig import open_rig
+from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.pipeline.track import track_recording
 
@@ -103,6 +105,21 @@ def test_the_opening_is_spread_over_the_first_seconds(recording):
     assert opening.times[0] == 0
     assert opening.times[-1] > 1.5
     assert len(opening.times) == len(opening.masks) <= 40
+
+
+def test_a_look_makes_few_silhouettes_of_the_opening(recording, monkeypatch):
+    made_ones = list[float]()
+
+    def segmented(silhouettes, frame):
+        made_ones.append(frame.time)
+        return as_before(silhouettes, frame)
+
+    as_before = Silhouettes.segmented
+    survey = survey_rig(open_rig(recording, Options()), Options())
+    monkeypatch.setattr(Silhouettes, "segmented", segmented)
+    first = survey.first.masks
+    assert len(list(first)) > SETS_COMPARED
+    assert len(made_ones) == made_rig.CAMERAS * (len(first) - SETS_COMPARED)
 
 
 def test_films_of_other_rates_and_lengths_are_doubted(spoilt):
