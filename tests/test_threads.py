@@ -4,7 +4,7 @@ import cv2
 import made
 import pytest
 
-from shadowpuppet.threads import THREADS_VARIABLE, MadeOnDemand, limit_threads, thread_limit, usable_cores
+from shadowpuppet.threads import THREADS_VARIABLE, MadeOnDemand, limit_threads, one_opencv_thread, thread_limit, usable_cores
 
 
 @pytest.mark.parametrize(("told", "limit"), [("1", 1), ("3", 3), ("0", None), ("", None), ("many", None), ("-2", None)])
@@ -19,6 +19,13 @@ def test_threads_are_those_that_the_environment_allows(monkeypatch, told, limit)
         assert cv2.getNumThreads() == (limit or before)
     finally:
         cv2.setNumThreads(before)
+
+
+def test_opencv_uses_one_thread_where_each_core_has_a_film_of_its_own():
+    before = cv2.getNumThreads()
+    with one_opencv_thread():
+        assert cv2.getNumThreads() == 1
+    assert cv2.getNumThreads() == before
 
 
 def test_films_are_the_same_with_any_number_of_threads(monkeypatch, tmp_path, rng):

@@ -34,6 +34,20 @@ def one_blas_thread() -> Iterator[None]:
         yield
 
 
+@contextmanager
+def one_opencv_thread() -> Iterator[None]:
+    """Context in which OpenCV uses one thread. Where each core has a film of its own, sharing out every picture among them costs a sixth of
+    the time."""
+    import cv2
+
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)
+
+
 def thread_limit() -> int | None:
     """The number of threads that this process is limited to; None without a limit."""
     value = os.environ.get(THREADS_VARIABLE, "")

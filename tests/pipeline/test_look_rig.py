@@ -18,12 +18,14 @@ from shadowpuppet.cli.app import run
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.pipeline.footage import RUN, RUN_OF_SEVERAL, RUNS, RUNS_OF_SEVERAL, take_sample
 from shadowpuppet.pipeline.look import RigLook
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.prepare import MULTIVIEW, look_at, prepare
 from shadowpuppet.pipeline.progress import Listener, Steps, json_text
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.pipeline.survey.opening import opening_of
 from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.pipeline.track import track_recording
 
@@ -120,6 +122,20 @@ def test_a_look_makes_few_silhouettes_of_the_opening(recording, monkeypatch):
     first = survey.first.masks
     assert len(list(first)) > SETS_COMPARED
     assert len(made_ones) == made_rig.CAMERAS * (len(first) - SETS_COMPARED)
+
+
+def test_each_of_several_cameras_needs_fewer_frames_and_a_few_of_the_empty_scene(spoilt):
+    shutil.rmtree(spoilt / "masks")
+    for kind in ("video", "background"):
+        pictures = [np.full((*made_rig.SIZE[::-1], 3), 3 * n, np.uint8) for n in range(60)]
+        made.write_film(spoilt / kind / "cam1.mp4", pictures, made_rig.RATE)
+    rig = open_rig(spoilt, Options())
+    footage, count = rig.footage[0], RUNS_OF_SEVERAL * RUN_OF_SEVERAL
+    assert len(take_sample(footage, opening=opening_of(rig)).frames) == count
+    assert len(take_sample(footage).frames) == RUNS * RUN
+    assert len(list(footage.empty_scene())) == count
+    alone = replace(footage, recording=replace(footage.recording, views=footage.recording.views[:1]))
+    assert len(list(alone.empty_scene())) == 60
 
 
 def test_films_of_other_rates_and_lengths_are_doubted(spoilt):

@@ -22,7 +22,7 @@ from shadowpuppet.pipeline.survey.cautions import GOOD, clutter_cautions, condit
 from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, of_several, survey_film
 from shadowpuppet.pipeline.survey.opening import OPENING, first_seconds, opening_of
 from shadowpuppet.silhouette.added import SceneHint
-from shadowpuppet.threads import usable_cores
+from shadowpuppet.threads import one_opencv_thread, usable_cores
 from shadowpuppet.tracking.people.views import View, views_of
 
 SILHOUETTES_OR_CAMERAS = "silhouettes do not fit together: film the empty scene, or calibrate"
@@ -31,6 +31,7 @@ RATES, LENGTHS = 0.02, 0.1
 """Relative difference of rates, and difference of lengths (s), above which films are reported to differ."""
 
 
+@one_opencv_thread()
 def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), listener: Listener | None = None) -> Survey:
     """Examine each camera's film, and the first seconds of all together; `hints` as in `survey_film`, by camera. Raises a
     `ShadowPuppetError` if something cannot be used."""
