@@ -273,8 +273,7 @@ def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKE
     missing."""
     film = footage.film
     length = footage.count or (film.duration * film.rate if np.isfinite(film.duration * film.rate) else LOOKED_AT)
-    runs = (RUNS, RUN) if opening is None else (RUNS_OF_SEVERAL, RUN_OF_SEVERAL)
-    wanted = _spread(min(int(length), longest), *runs)
+    wanted = _spread(min(int(length), longest), *((RUNS, RUN) if opening is None else (RUNS_OF_SEVERAL, RUN_OF_SEVERAL)))
     runs: dict[int, list[CameraFrame]] = {}
     first, times, begin = list[CameraFrame](), list[float](), footage.recording.begin
     next_first = begin
