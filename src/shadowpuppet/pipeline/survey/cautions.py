@@ -65,7 +65,8 @@ def feet_cautions(bottom: Mapping[str, float]) -> list[Caution]:
     named = " and ".join(map(repr, cut)) if len(cut) < 3 else f"{len(cut)} cameras"
     shown = sum(share < MOSTLY for share in bottom.values())
     return [Caution(f"the feet are cut off at the bottom of the picture ({where}): where fewer than two cameras show them they are "
-                    "guessed; step back, or tilt the cameras", f"feet cut off in {named}: step back or tilt", NOTED if shown > 1 else HARMFUL)]
+                    "guessed; step back, or tilt the cameras", f"feet cut off in {named}: step back or tilt",
+                    NOTED if shown > 1 else HARMFUL)]
 
 
 def sitting_cautions(masks: Sequence[Mask], times: Sequence[float]) -> list[Caution]:
