@@ -4,7 +4,7 @@ import cv2
 import made
 import pytest
 
-from shadowpuppet.threads import THREADS_VARIABLE, limit_threads, thread_limit, usable_cores
+from shadowpuppet.threads import THREADS_VARIABLE, MadeOnDemand, limit_threads, one_opencv_thread, thread_limit, usable_cores
 
 
 @pytest.mark.parametrize(("told", "limit"), [("1", 1), ("3", 3), ("0", None), ("", None), ("many", None), ("-2", None)])
@@ -21,6 +21,13 @@ def test_threads_are_those_that_the_environment_allows(monkeypatch, told, limit)
         cv2.setNumThreads(before)
 
 
+def test_opencv_uses_one_thread_where_each_core_has_a_film_of_its_own():
+    before = cv2.getNumThreads()
+    with one_opencv_thread():
+        assert cv2.getNumThreads() == 1
+    assert cv2.getNumThreads() == before
+
+
 def test_films_are_the_same_with_any_number_of_threads(monkeypatch, tmp_path, rng):
     made.write_film(tmp_path / "film.mp4", rng.integers(0, 255, (12, 48, 64, 3), "u1"))
     found = []
@@ -29,3 +36,22 @@ def test_films_are_the_same_with_any_number_of_threads(monkeypatch, tmp_path, rn
         found.append([image.tobytes() for image in made.images(tmp_path / "film.mp4")])
     assert found[0] == found[1] == found[2]
     assert len(found[0]) == 12
+
+
+def test_items_are_made_once_when_they_are_asked_for():
+    asked = []
+
+    def make(n):
+        asked.append(n)
+        return str(n)
+
+    items = MadeOnDemand(make, 6)
+    assert len(items) == 6
+    assert (items[2], items[-1], items[2]) == ("2", "5", "2")
+    assert sorted(asked) == [2, 5]
+    assert items[1:3] == items.several([1, 2]) == ["1", "2"]
+    assert list(items) == list(items) == list("012345")
+    assert sorted(asked) == list(range(6))
+    with pytest.raises(IndexError):
+        items[6]
+    assert not MadeOnDemand(make, 0)

@@ -216,6 +216,20 @@ def test_status_time_and_overlap_are_written(rng):
         np.testing.assert_array_equal(frame[: 2 * 120], frames[0][: 2 * 120])
 
 
+def test_a_long_caption_takes_several_lines_and_none_is_cut_off():
+    said = "12.34 s  tracked, trunk, both arms, both legs doubtful  IoU 0.81"
+    for width, most in ((320, 2), (160, 4), (1200, 1)):
+        out = np.full((3 * 240, width, 3), 128, np.uint8)
+        lines = drawing.lines_below(out, said, 480)
+        assert " ".join(line for _, line in lines) == said
+        assert 1 <= len(lines) <= most
+        for top, line in lines:
+            assert drawing.write_text(out, line, top, drawing.WHITE) <= width + 10
+        inked = np.flatnonzero((out[480:] != 128).any((1, 2)))
+        assert len(inked) >= 8 * len(lines)
+        assert (out[:, -1] == 128).all()
+
+
 def test_grey_pictures_do(rng):
     picture = a_picture()
     image, mask = a_scene(rng, picture)

@@ -128,7 +128,7 @@ def test_how_far_cameras_disagree(printed):
     assert printed(check_table(check())) == [
         "recording lab", "compared 240 sets of silhouettes, 25 a second, of 50 frames/s",
         "limit 12.8 px; cameras that fit are apart by about one",
-        "seen 1.76 m tall, hair, shoes and raised hands included", "camera disagrees by with late by 90 % within",
+        "seen silhouettes span 1.76 m, raised hands, hair and shoes included", "camera disagrees by with late by 90 % within",
         "a 1.0 px 2 others 0.0 frames ± 0.1", "b unknown 1 others cannot tell", "c 9.0 px 2 others 2.2 frames ± 0.3 wrong: place and time",
         "verdict this", "that",
     ]  # fmt: skip

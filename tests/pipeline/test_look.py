@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import asdict, replace
 
 import made
@@ -24,6 +25,8 @@ from shadowpuppet.pipeline.survey.film import quality_of, survey_film
 from shadowpuppet.pipeline.track import json_text, track_recording
 from shadowpuppet.silhouette import RecoveredScene
 from shadowpuppet.silhouette.quality import mask_quality
+from shadowpuppet.synthetic import synthesize
+from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.tracking.monocular.initialization import POSTURES, PersonEstimate, SizeFit, sizes_from_height
 
 QUICK = {"rounds": 20, "patience": 5, "sweeps": 2}
@@ -207,7 +210,7 @@ def test_a_scene_taken_from_the_film_is_said(recording, tmp_path):
 def look_at_masks(recording):
     """The look without the search for the person."""
     footage = open_footage(recording, Options())
-    return _look(footage, survey_film(footage, Options()))
+    return _look(footage, survey_film(footage, Options()), whole=False)
 
 
 def test_uneven_times_are_said(recording, tmp_path):
@@ -304,6 +307,23 @@ def test_arms_that_are_not_seen_and_trunks_that_are_too_deep_show_a_wrong_postur
     broad = replace(fit, guess=replace(fit.guess, sizes=sizes.with_values(torso_bottom_width=0.7)), overlaps={"front_t_pose": 0.9})
     assert "the trunk is 0.70 m wide, expected under 0.58" in str(wrong_posture(camera, mask, "front_t_pose", broad, pose))
     assert "by 0.30 only" in str(wrong_posture(camera, mask, name, replace(fit, overlaps={name: 0.3}), pose))
+
+
+def seated_doubts(folder, motion, options=None):
+    synthesize(replace(made.SPEC, motion=parse_gestures(motion)), folder, np.random.default_rng(3))
+    survey = MONOCULAR.survey(open_rig(folder, options or Options()), options or Options())
+    return {doubt.short: doubt for doubt in survey.look.doubts}
+
+
+def test_who_sits_down_later_is_told_from_who_bows(tmp_path):
+    (short,) = seated_doubts(tmp_path / "sits", "stand 3, sit_down 4")
+    assert re.fullmatch(r"person sits or kneels at [4-6].\d s: cut, or --body anatomical", short)
+    assert seated_doubts(tmp_path / "bows", "bow_forward 3, wave_hands 2") == {}
+
+
+def test_feet_are_missed_only_where_legs_are_tracked(tmp_path):
+    found = seated_doubts(tmp_path / "stands", "wave_hands 2", make_options({"body": "anatomical"}))
+    assert [(each.short, each.weight) for each in found.values()] == [("feet are cut off: step back, or tilt the camera", HARMFUL)]
 
 
 # What is looked at

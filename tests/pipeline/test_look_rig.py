@@ -13,16 +13,20 @@ import made_rig
 import numpy as np
 import pytest
 
+from shadowpuppet.calibration.agreement import SETS_COMPARED
 from shadowpuppet.cli.app import run
-from shadowpuppet.errors import TrackingError
+from shadowpuppet.errors import HARMFUL, NOTED, TrackingError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.pipeline.footage import RUN, RUN_OF_SEVERAL, RUNS, RUNS_OF_SEVERAL, take_sample
 from shadowpuppet.pipeline.look import RigLook
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.prepare import MULTIVIEW, look_at, prepare
 from shadowpuppet.pipeline.progress import Listener, Steps, json_text
 from shadowpuppet.pipeline.rig import open_rig
-from shadowpuppet.pipeline.survey.rig import survey_rig
+from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.pipeline.survey.opening import opening_of
+from shadowpuppet.pipeline.survey.rig import _rig_doubts, survey_rig
 from shadowpuppet.pipeline.track import track_recording
 
 MASKS = Options(masks=True)
@@ -103,6 +107,63 @@ def test_the_opening_is_spread_over_the_first_seconds(recording):
     assert opening.times[0] == 0
     assert opening.times[-1] > 1.5
     assert len(opening.times) == len(opening.masks) <= 40
+
+
+def test_a_look_makes_few_silhouettes_of_the_opening(recording, monkeypatch):
+    made_ones = list[float]()
+
+    def segmented(silhouettes, frame):
+        made_ones.append(frame.time)
+        return as_before(silhouettes, frame)
+
+    as_before = Silhouettes.segmented
+    survey = survey_rig(open_rig(recording, Options()), Options())
+    monkeypatch.setattr(Silhouettes, "segmented", segmented)
+    first = survey.first.masks
+    assert len(list(first)) > SETS_COMPARED
+    assert len(made_ones) == made_rig.CAMERAS * (len(first) - SETS_COMPARED)
+
+
+def test_each_of_several_cameras_needs_fewer_frames_and_a_few_of_the_empty_scene(spoilt):
+    shutil.rmtree(spoilt / "masks")
+    for kind in ("video", "background"):
+        pictures = [np.full((*made_rig.SIZE[::-1], 3), 3 * n, np.uint8) for n in range(60)]
+        made.write_film(spoilt / kind / "cam1.mp4", pictures, made_rig.RATE)
+    rig = open_rig(spoilt, Options())
+    footage, count = rig.footage[0], RUNS_OF_SEVERAL * RUN_OF_SEVERAL
+    assert len(take_sample(footage, opening=opening_of(rig)).frames) == count
+    assert len(take_sample(footage).frames) == RUNS * RUN
+    assert len(list(footage.empty_scene())) == count
+    alone = replace(footage, recording=replace(footage.recording, views=footage.recording.views[:1]))
+    assert len(list(alone.empty_scene())) == 60
+
+
+def cut(look: RigLook, **shares: dict[str, float]) -> RigLook:
+    """The look, with shares of frames in which the person touches a side, by camera."""
+    def of(camera):
+        return replace(camera, quality=replace(camera.quality, border=camera.quality.border | shares.get(camera.name, {})))
+
+    return replace(look, cameras=tuple(map(of, look.cameras)))
+
+
+def test_who_is_cut_off_in_one_picture_but_whole_in_three_others_is_no_doubt(recording):
+    look = looked(recording)
+    (one,) = [doubt for doubt in _rig_doubts(cut(look, cam2={"left": 0.3})) if "person is cut off" in doubt.short]
+    assert (one.short, one.weight) == ("camera 'cam2': person is cut off at the left: step back", NOTED)
+    both = [doubt for doubt in _rig_doubts(cut(look, cam2={"left": 0.3}, cam4={"top": 0.1})) if "person is cut off" in doubt.short]
+    assert [doubt.weight for doubt in both] == [HARMFUL, HARMFUL]
+
+
+def test_feet_that_too_few_cameras_show_are_a_doubt(recording):
+    look = looked(recording)
+    assert not [doubt for doubt in _rig_doubts(look) if "feet" in doubt.short]
+    (some,) = [doubt for doubt in _rig_doubts(cut(look, cam1={"bottom": 0.9}, cam2={"bottom": 0.2})) if "feet" in doubt.short]
+    assert (some.short, some.weight) == ("feet cut off in 'cam1' and 'cam2': step back or tilt", NOTED)
+    assert "camera 'cam1' in 90 % of the frames, camera 'cam2' in 20 %" in some
+    three = {f"cam{n}": {"bottom": 0.6} for n in (1, 2, 3)}
+    (most,) = [doubt for doubt in _rig_doubts(cut(look, **three)) if "feet" in doubt.short]
+    assert (most.short, most.weight) == ("feet cut off in 3 cameras: step back or tilt", HARMFUL)
+    assert not [doubt for doubt in _rig_doubts(cut(look, **three), several=True) if "feet" in doubt.short]
 
 
 def test_films_of_other_rates_and_lengths_are_doubted(spoilt):

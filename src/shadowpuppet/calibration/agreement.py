@@ -15,6 +15,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import HARMFUL, RUINOUS, Caution
 from shadowpuppet.geometry import Array, evenly_spread, inverse
+from shadowpuppet.threads import MadeOnDemand
 
 MAX_DISAGREEMENT = 0.01
 """Disagreement from which on a camera is in doubt, over the picture's longer side (6 of 640 pixels); good cameras differ by one pixel."""
@@ -85,7 +86,9 @@ class Agreement:
 
 def agreement(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]], seconds: float = np.nan) -> Agreement:
     """`compare_cameras` of masks (H, W) by set and camera, None where there is none."""
-    return compare_cameras(cameras, [silhouettes_of(row) for row in masks], seconds)
+    rows = MadeOnDemand(lambda n: silhouettes_of(masks[n]), len(masks))
+    rows.several(evenly_spread(len(masks), SETS_COMPARED).tolist() if masks else ())
+    return compare_cameras(cameras, rows, seconds)
 
 
 def compare_cameras(cameras: Sequence[Camera], rows: Sequence[Row], seconds: float = np.nan, remedies: bool = True) -> Agreement:

@@ -30,6 +30,8 @@ DASH = 8
 """Length of the dashes and gaps of such a limb's bones, in pictures 240 pixels high, pixels."""
 MATCHING = np.array([BLACK, MODEL_ONLY, SILHOUETTE_ONLY, WHITE, (40, 40, 40), (40, 40, 40), GREY, GREY], np.uint8)
 """Colours of the matching row, indexed by model + 2 silhouette + 4 ignored."""
+LINE = 36
+"""Distance of lines of text, pixels at a scale of 1."""
 SUBPIXEL = 4
 """Fractional bits of pixel coordinates in OpenCV's drawing."""
 
@@ -229,7 +231,8 @@ def _label(out: Image, height: int, status: str, time: float, overlap: float, ig
     write_words(out, 0, (("best estimate", WHITE), *LEGEND))
     left_out = (("left out", (150, 150, 150)),) if ignores else ()
     write_words(out, height, (("model only", MODEL_ONLY), ("silhouette only", SILHOUETTE_ONLY), ("both", WHITE), *left_out))
-    write_text(out, f"{time:.2f} s  {status}{fit}", 2 * height, WHITE)
+    for top, line in lines_below(out, f"{time:.2f} s  {status}{fit}", 2 * height):
+        write_text(out, line, top, WHITE)
 
 
 def write_words(out: Image, top: int, words: Iterable[tuple[str, Colour]], size: float | None = None) -> None:
@@ -239,12 +242,34 @@ def write_words(out: Image, top: int, words: Iterable[tuple[str, Colour]], size:
         end = write_text(out, text, top, colour, end, size)
 
 
+def lines_below(out: Image, text: str, top: int, size: float | None = None) -> list[tuple[int, str]]:
+    """A text as lines that fit into a picture, broken at blanks, each with its `top` for `write_text`, the first's below `top`."""
+    import cv2
+
+    scale, thickness = _scale(out, size)
+    lines, most = [""], out.shape[1] - round(12 * scale)
+    for word in text.split(" "):
+        longer = f"{lines[-1]} {word}" if lines[-1] else word
+        (width, _), _ = cv2.getTextSize(longer, cv2.FONT_HERSHEY_SIMPLEX, scale, thickness)
+        if lines[-1] and round(12 * scale) + width > most:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    return [(top + n * round(LINE * scale), line) for n, line in enumerate(lines)]
+
+
+def _scale(out: Image, size: float | None) -> tuple[float, int]:
+    """Scale of the font and thickness of its lines for a picture of height `size`; None: for one of three rows."""
+    scale = max(0.35, (out.shape[0] / 3 if size is None else size) / 600)
+    return scale, max(1, round(1.5 * scale))
+
+
 def write_text(out: Image, text: str, top: int, colour: tuple[int, int, int], left: int = 0, size: float | None = None) -> int:
     """Write a line of text with a dark rim below `top`, scaled for a picture of height `size`; returns the text's right end."""
     import cv2
 
-    scale = max(0.35, (out.shape[0] / 3 if size is None else size) / 600)
-    thickness, rim = max(1, round(1.5 * scale)), max(1, round(scale))
+    scale, thickness = _scale(out, size)
+    rim = max(1, round(scale))
     (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, thickness)
     x, y = left + round(12 * scale), top + height + round(12 * scale)
     # The rim is the same text moved, because OpenCV 5 draws thicker text wider.

@@ -16,7 +16,7 @@ from shadowpuppet.pipeline.look import CameraLook, Look, RigLook
 def look_table(look: Look | RigLook, everything: bool = True) -> RenderableType:
     """Table of the look at a recording; the recording, its scale and the person only, if not `everything`."""
     if isinstance(look, RigLook):
-        return _rig_table(look) if everything else pairs([*_rig_rows(look), *_rig_scale(look)])
+        return _rig_table(look) if everything else pairs([*_rig_rows(look), *_rig_scale(look)[1:]])
     if not everything:
         return pairs([("recording", look.recording), ("camera", _camera(look)), ("film", _film(look)), ("scale", look.scale),
                       ("person", _person(look.person) if look.person is not None else None)])

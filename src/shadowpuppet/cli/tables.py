@@ -18,6 +18,11 @@ if TYPE_CHECKING:
     from shadowpuppet.pipeline.verdict.verdict import Verdict
 
 
+SENSES = {"uncertain": " (the outline fits badly)", "predicted": " (bridged or unseen)", "lost": " (nothing fits)",
+          "absent": " (nobody in the picture)"}
+"""What a frame's status says, beside it in a table; `tracked` needs no words."""
+
+
 def show(*parts: RenderableType) -> None:
     """Print tables with an empty line between them."""
     console = Console(file=sys.stdout, highlight=False)
@@ -69,8 +74,9 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], rig
 
 
 def seen_height(height: float | None) -> str | None:
-    """The height (m) that the cameras agree on, in words; it is not the person's, which is given or measured."""
-    return None if height is None else f"{height:.2f} m tall, hair, shoes and raised hands included"
+    """What the silhouettes span where the cameras see the person (m), in words: a check of the calibration, not the person's height, which
+    is given or measured."""
+    return None if height is None else f"silhouettes span {height:.2f} m, raised hands, hair and shoes included"
 
 
 def verdict_table(verdict: Verdict, title: str) -> RenderableType:
@@ -99,10 +105,8 @@ def metrics_table(metrics: Mapping[str, Any]) -> RenderableType:
     from shadowpuppet.evaluation.summary_text import doubt_text, overlap_sense
     from shadowpuppet.motion.metrics import FAR_ERROR, LOST_ERROR
 
-    multiview = "cost_m2" in metrics
-    overlap, cost = metrics["overlap"], metrics["cost_m2" if multiview else "cost_px"]
-    scale, unit, digits = (1e4, "cm2", 1) if multiview else (1, "pixels", 0)
-    statuses = ", ".join(f"{count} {status}" for status, count in metrics["status"].items())
+    multiview, overlap = "cost_m2" in metrics, metrics["overlap"]
+    statuses = ", ".join(f"{count} {status}{SENSES.get(status, '')}" for status, count in metrics["status"].items())
     jitter, truth_jitter = metrics["jitter_m_s2"], metrics.get("truth_jitter_m_s2")
     rows: list[tuple[str, str | None]] = [
         ("frames", f"{metrics['frames']}: {statuses}" if statuses else "none"),
@@ -110,8 +114,6 @@ def metrics_table(metrics: Mapping[str, Any]) -> RenderableType:
         ("legs", "not tracked; --body anatomical tracks them, with much doubt, if feet are seen" if _lacks_legs(metrics) else None),
         ("overlap", f"{overlap['mean']:.3f}, {overlap_sense(overlap['mean'])} (IoU of body and silhouette; p5 {overlap['p5']:.3f})"
                     if overlap["count"] else None),
-        ("cost", f"{scale * cost['mean']:.{digits}f} {unit} (p95 {scale * cost['p95']:.{digits}f})" if cost["count"]
-                 else None),
         ("jitter", None if jitter is None or not isfinite(jitter) else f"{jitter:.2f} m/s2"
                    + (f", the truth's {_number(truth_jitter)}" if truth_jitter is not None else "")),
     ]  # fmt: skip

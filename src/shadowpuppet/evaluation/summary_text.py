@@ -124,7 +124,8 @@ def gait_text(gait: Mapping[str, Any]) -> str | None:
         return gait["no_gait"]
     cadence, length, width, stance, speed = (gait["figures"][name]["both"]["mean"] for name in (
         "cadence", "step length", "step width", "stance", "speed"))
-    return (f"{gait['strides']} strides, {gait['steps']} steps: {cadence:.1f} steps/min, {length:.3f} m long, {width:.3f} m wide, "
+    strides, steps = (f"{gait[what]} {what.removesuffix('s') if gait[what] == 1 else what}" for what in ("strides", "steps"))
+    return (f"{strides}, {steps}: {cadence:.1f} steps/min, {length:.3f} m long, {width:.3f} m wide, "
             f"{speed:.2f} m/s, stance {stance:.1f} %")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -24,6 +25,9 @@ LOOKED_AT = 1500
 """Number of frames, from the film's beginning, that a sample is taken from: examining a film must not take as long as tracking it."""
 RUNS, RUN = 10, 4
 """Number of a sample's runs, spread over these frames, and of consecutive frames in each."""
+RUNS_OF_SEVERAL, RUN_OF_SEVERAL = 8, 3
+"""The same of each of several cameras, which show the same person. Their empty scenes are learnt from as many frames: with more, masks are
+the same."""
 FIRST_SECONDS, FIRST = 8.0, 16
 """Length of the film's beginning (s), and number of its frames that a sample keeps."""
 SPREAD = 60
@@ -96,8 +100,15 @@ class Footage:
         last = film.count if self.recording.duration is None else int(np.ceil((self.view.start + self.recording.duration) * film.rate))
         return max(min(last, film.count) - first, 0)
 
-    def pictures(self, source: Path, what: str) -> Iterator[Image]:
-        """Images of the same camera from another file, at the working size; `what` names them in messages.
+    def empty_scene(self) -> Iterator[Image]:
+        """Images of the empty scene: with several cameras a few, in runs spread over its film. Raises `RecordingError` as `pictures`
+        does."""
+        assert self.view.background is not None
+        return self.pictures(self.view.background, "the empty scene", len(self.recording.views) > 1)
+
+    def pictures(self, source: Path, what: str, sampled: bool = False) -> Iterator[Image]:
+        """Images of the same camera from another file, at the working size; `what` names them in messages. `sampled`: only those that a
+        sample of several cameras would have.
 
         Raises `RecordingError` if their size is not the film's, with or without the padding of H.264.
         """
@@ -105,7 +116,11 @@ class Footage:
         if frames.size != (width, height) and not differ_by_padding(frames.size, (width, height)):
             raise RecordingError(f"{source}: found {what} of {frames.size[0]} x {frames.size[1]} pixels, expected {width} x {height} "
                                  "as the film: it must come from the same camera at the same setting")
-        return (frame.image for frame in fitted(frames, self.camera.size, self.view.camera.size))
+        frames = fitted(frames, self.camera.size, self.view.camera.size)
+        if not sampled or frames.count is None:
+            return (frame.image for frame in frames)
+        number, wanted = itertools.count(), _spread(frames.count, RUNS_OF_SEVERAL, RUN_OF_SEVERAL)
+        return (frame.image for frame in frames.read(lambda _: next(number) in wanted))
 
 
 def open_footage(path: str | Path, options: Options) -> Footage:
@@ -253,11 +268,12 @@ class Opening(NamedTuple):
 
 
 def take_sample(footage: Footage, need_masks: bool = False, longest: int = LOOKED_AT, opening: Opening | None = None) -> Sample:
-    """Sample the film's first `longest` frames, reading them once. `opening`: frames to keep of the film's beginning; None for `FIRST`
-    frames, evenly spread over `FIRST_SECONDS`. With `need_masks`, raises `SilhouetteError` if ready silhouettes are missing."""
+    """Sample the film's first `longest` frames, reading them once. `opening`: frames to keep of the beginning of one of several cameras'
+    films; None for `FIRST` frames, evenly spread over `FIRST_SECONDS`. With `need_masks`, raises `SilhouetteError` if ready silhouettes are
+    missing."""
     film = footage.film
     length = footage.count or (film.duration * film.rate if np.isfinite(film.duration * film.rate) else LOOKED_AT)
-    wanted = _spread(min(int(length), longest))
+    wanted = _spread(min(int(length), longest), *((RUNS, RUN) if opening is None else (RUNS_OF_SEVERAL, RUN_OF_SEVERAL)))
     runs: dict[int, list[CameraFrame]] = {}
     first, times, begin = list[CameraFrame](), list[float](), footage.recording.begin
     next_first = begin
@@ -294,9 +310,9 @@ def spread_frames(footage: Footage, number: int = SPREAD) -> list[Image]:
         return [image for image in found if image is not None]
 
 
-def _spread(length: int) -> dict[int, int]:
+def _spread(length: int, runs: int = RUNS, run: int = RUN) -> dict[int, int]:
     """Maps the number of each sampled frame to the number of its run's first frame."""
-    if length <= RUNS * RUN:
+    if length <= runs * run:
         return dict.fromkeys(range(max(length, 1)), 0)
-    starts = np.linspace(0, length - RUN, RUNS).astype(int).tolist()
-    return {start + i: start for start in reversed(starts) for i in range(RUN)}
+    starts = np.linspace(0, length - run, runs).astype(int).tolist()
+    return {start + i: start for start in reversed(starts) for i in range(run)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -129,8 +130,9 @@ class FirstSeconds(NamedTuple):
 
     times: list[float]
     """F times, seconds."""
-    masks: list[tuple[Mask | None, ...]]
-    """For each time a mask (H, W) per camera; None for a camera without a frame."""
+    masks: Sequence[tuple[Mask | None, ...]]
+    """For each time a mask (H, W) per camera; None for a camera without a frame. With several cameras they are made when they are asked
+    for: a look needs a few of them only."""
     spread: tuple[tuple[Mask | None, ...], ...] = ()
     """With one camera: masks of moments spread over the whole film, as `masks`."""
 

@@ -6,7 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shadowpuppet.camera.drawing import BLACK, LEGEND, SILHOUETTE_ONLY, WHITE, draw_model, in_colour, said_of, write_text, write_words
+from shadowpuppet.camera.drawing import (
+    BLACK,
+    LEGEND,
+    SILHOUETTE_ONLY,
+    WHITE,
+    draw_model,
+    in_colour,
+    lines_below,
+    said_of,
+    write_text,
+    write_words,
+)
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.motion.limbs import LIMBS, status_in_words
@@ -59,9 +70,11 @@ def _grid(frames: FrameSet, people: Sequence[tuple[MotionFrame, Sequence[Picture
         _fit(tile, None if image is None else _tile(image, mask, drawn))
         write_text(tile, name if image is not None else f"{name}: no picture", 0, WHITE, size=height)
     size = max(LEAST_SIZE, height)
-    legend, caption = (out.shape[0] - round(up * size / LEAST_SIZE) for up in (65, 40))
+    lines = lines_below(out, f"{frames.time:.2f} s  {words}", 0, size)
+    legend, caption = (out.shape[0] - round(up * size / LEAST_SIZE) - lines[-1][0] for up in (65, 40))
     write_words(out, legend, (*LEGEND, ("outline: silhouette", SILHOUETTE_ONLY)), size)
-    write_text(out, f"{frames.time:.2f} s  {words}", caption, WHITE, size=size)
+    for below, line in lines:
+        write_text(out, line, caption + below, WHITE, size=size)
     return out
 
 

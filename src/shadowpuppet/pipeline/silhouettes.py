@@ -131,7 +131,7 @@ def learn_silhouettes(footage: Footage, sample: Sample, options: Options, recove
         return Silhouettes(f"{_short(footage.view.masks)}, ready silhouettes", None, footage.region)
     images = [frame.image for frame in sample.frames]
     if footage.view.background is not None:
-        scene, source, recovered = footage.pictures(footage.view.background, "the empty scene"), _short(footage.view.background), None
+        scene, source, recovered = footage.empty_scene(), _short(footage.view.background), None
     else:
         recovered = recovered or _recovered(footage, images)
         scene, source = iter([recovered.picture]), f"the film itself (recovered from {recovered.frames} frames)"

@@ -77,11 +77,17 @@ class MaskQuality:
                     "or the camera moved since the background was taken; take it again, or leave it out: the film then serves")
         return None
 
-    def warnings(self) -> tuple[Caution, ...]:
-        """What harms tracking, and the remedy, a sentence each; none if there is a refusal."""
-        return () if self.refusal() else (*self._incomplete(), *self._unsteady(), *self._unclean())
+    @property
+    def cut_off(self) -> tuple[str, ...]:
+        """Sides of the picture at which the person is cut off, but for the bottom, where an upper body's legs may be."""
+        return tuple(side for side in ("left", "right", "top") if self.border[side] > WARN_CONTACT)
 
-    def _incomplete(self) -> Iterator[Caution]:
+    def warnings(self, whole_elsewhere: bool = False) -> tuple[Caution, ...]:
+        """What harms tracking, and the remedy, a sentence each; none if there is a refusal. `whole_elsewhere`: whether enough other cameras
+        show all of a person who is cut off."""
+        return () if self.refusal() else (*self._incomplete(NOTED if whole_elsewhere else HARMFUL), *self._unsteady(), *self._unclean())
+
+    def _incomplete(self, cut_off: int) -> Iterator[Caution]:
         if self.empty:
             yield Caution(f"the silhouette is empty in {self._share(self.empty)} of the frames, first in frame {self.first_empty}: the "
                           "person is out of the picture, or does not differ from the background; cut the film, or set another method",
@@ -91,11 +97,10 @@ class MaskQuality:
             yield Caution(f"nearly all of the picture is silhouette in {self._share(self.full)} of the frames, first in frame "
                           f"{self.first_full}: the light changed or the camera moved; cut the film there, or fix camera and exposure",
                           f"light or camera changed at frame {self.first_full}: --end {self.first_full}f", HARMFUL)
-        for side in ("left", "right", "top"):
-            if self.border[side] > WARN_CONTACT:
-                yield Caution(f"the silhouette touches the {side} border in {_percent(self.border[side])} of the frames: the person "
-                              "is partly outside the picture, and what is outside is guessed; step back, or turn the camera",
-                              f"person is cut off at the {side}: step back", HARMFUL)
+        for side in self.cut_off:
+            yield Caution(f"the silhouette touches the {side} border in {_percent(self.border[side])} of the frames: the person "
+                          "is partly outside the picture, and what is outside is guessed; step back, or turn the camera",
+                          f"person is cut off at the {side}: step back", cut_off)
         if 0 < self.area < MIN_AREA:
             yield Caution(f"the person covers {100 * self.area:.2g} % of the picture: too little to see limbs; go nearer, or use a "
                           "camera with more pixels", "person is too small in the picture: go nearer", HARMFUL)

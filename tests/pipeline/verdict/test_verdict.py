@@ -12,7 +12,7 @@ from shadowpuppet.calibration.agreement import Agreement
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
 from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
-from shadowpuppet.pipeline.look import Look
+from shadowpuppet.pipeline.look import Look, RigLook
 from shadowpuppet.pipeline.verdict.of_run import _together, blind_frames, expected_error, lost_share, verdict_of_run
 from shadowpuppet.pipeline.verdict.verdict import verdict_of, verdict_of_look
 from shadowpuppet.silhouette.correction.condition import FilmCondition
@@ -110,6 +110,18 @@ def test_runs_are_judged_by_what_they_state(run, word, reason):
     verdict = verdict_of_run(LOOK, run)
     assert verdict.word == word
     assert verdict.reasons[:1] == (() if reason is None else (reason,))
+
+
+@pytest.mark.parametrize(("arm", "word"), [(0.03, "good"), (0.05, "doubtful")])
+def test_with_several_cameras_an_arm_that_is_often_doubtful_counts_where_it_may_be_far_off(arm, word):
+    """The arm is expected to be off by 48 or 80 mm, the whole body by under 50."""
+    run = motion(0.012, doubtful=8)
+    deviations = run.joint_sd.copy()
+    deviations[:, 1:4] = arm
+    rig = RigLook(recording="lab", cameras=(None,) * 4, rate=25.0, frames=10, agreement=None)
+    found = verdict_of_run(rig, replace(run, joint_sd=deviations))
+    assert found == (word, ("left arm doubtful in 80 % of frames",))
+    assert verdict_of_run(LOOK, run).word == "doubtful"
 
 
 def test_frames_without_a_person_are_not_lost():

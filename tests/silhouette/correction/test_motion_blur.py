@@ -35,6 +35,15 @@ def test_slow_or_no_movement_tells_nothing():
     assert LEAST_PIXELS > 0
 
 
+def test_what_is_far_from_the_person_plays_no_part(rng):
+    (images,), (masks,) = film(2)
+    wide = [rng.integers(0, 255, (160, 240, 3)).astype(np.uint8) for _ in images]
+    for one, image in zip(wide, images):
+        one[60:100, 60:180] = image
+    around = [np.pad(mask, [(60, 60), (60, 60)]) for mask in masks]
+    assert blurred_share([wide], [around]) == blurred_share([images], [masks])
+
+
 @pytest.mark.parametrize("frames", [0, 1, 2])
 def test_runs_of_fewer_than_three_frames_tell_nothing(frames):
     assert blurred_share(*film(1, frames=frames)) is None

@@ -12,7 +12,19 @@ from solids import Ellipsoid, ring, seen_by
 
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.people.figures import EMPTY, NEW, ROWS, Figure, _height, _score, drawn, find_floor, find_people, telling
-from shadowpuppet.tracking.people.floor import ASIDE, HEIGHTS, LEGS, MOST_PLACES, POINTS, TRUNK, figure_points, floor_under, pixel_index
+from shadowpuppet.tracking.people.floor import (
+    ASIDE,
+    HEIGHTS,
+    LEGS,
+    MOST_PLACES,
+    POINTS,
+    SPACING,
+    TRUNK,
+    Ground,
+    figure_points,
+    floor_under,
+    pixel_index,
+)
 from shadowpuppet.tracking.people.presence import Followed, certain_number, counted, follow, sure_number
 
 ROUND = np.array([[-2.0, -2, 0], [2, 2, 1.8], [0, 0, 0], [-1, 1, 1], [1, -1, 1]])
@@ -183,6 +195,23 @@ def test_a_floor_that_is_not_the_world_s_is_found():
     moved = [replace(camera, T_camera_world=camera.T_camera_world @ drop) for camera in made]
     masks = seen(made, body(-1, 0.3), body(1, 0))
     assert find_floor(moved, VisualHull(moved).points(masks).points, [masks]).level == pytest.approx(-0.5, abs=0.06)
+
+
+def test_each_level_is_tried_once_and_what_floors_share_is_projected_once(monkeypatch):
+    made, levels, at = cameras(3), [], Ground.at
+
+    def tried(ground, level):
+        levels.append((len(ground.places), level))
+        return at(ground, level)
+
+    monkeypatch.setattr(Ground, "at", tried)
+    points = VisualHull(made).points(masks := seen(made, body(-1, 0.3))).points
+    found = find_floor(made, points, [masks])
+    assert len(levels) == len(set(levels)) <= 13
+    ground = Ground.under(made, points)
+    shared = [at(ground, level).pixels for level in (-0.3, 0.15, found.level)]
+    assert (shared[-1] == found.pixels).all()
+    assert len(ground.projected) < 2 * len(made) * (HEIGHTS[-1] / SPACING + 1)
 
 
 def test_a_figure_is_as_tall_as_its_silhouette_whatever_height_was_tried(rig):

@@ -31,7 +31,8 @@ def _gait(movement: Movement) -> Iterator[str]:
     assert gait is not None
     turn = np.degrees(np.mean([abs(step.turn) for step in gait.counted]))
     on_a_bend = f" The way bends, by {turn:.0f} degrees a step." if turn > 10 else ""
-    yield f"<p class=said>{len(gait.strides)} full strides; {plain(left_out_text(gait))}.{on_a_bend}</p>"
+    strides = "one full stride" if len(gait.strides) == 1 else f"{len(gait.strides)} full strides"
+    yield f"<p class=said>{strides}; {plain(left_out_text(gait))}.{on_a_bend}</p>"
     head = ["", "left", "right", "both", "90 %", "left to right, %", "steps or strides"]
     yield table(head, rows(_cells(each) for each in movement.figures))
     yield ("<p class=said>Mean and standard deviation over the steps or strides. 90 %: half the interval by the run's own statement, which "

@@ -55,8 +55,12 @@ def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes]) 
     leader = samples[0]
     reach = 0.5 * leader.pace if np.isfinite(leader.pace) else 0.0
     chosen = [leader.frames[n] for n in evenly_spread(len(leader.frames), SETS)]
-    return [tuple(None if (near := _nearest(sample, frame.time, reach)) is None else each(near)
-                  for sample, each in zip(samples, silhouettes, strict=True)) for frame in chosen]  # fmt: skip
+
+    def masks(sample: Sample, each: Silhouettes) -> list[Mask | None]:
+        return [None if (near := _nearest(sample, frame.time, reach)) is None else each(near) for frame in chosen]
+
+    with ThreadPoolExecutor(usable_cores(), "census") as pool:
+        return list(zip(*pool.map(masks, samples, silhouettes), strict=True))
 
 
 def later_sets(rig: Rig, silhouettes: Sequence[Silhouettes], after: float) -> list[tuple[Mask | None, ...]]:
@@ -84,12 +88,13 @@ def take_census(cameras: Sequence[Camera], sets: Sequence[Sequence[Mask | None]]
     """The people in frame sets of masks (H, W), one per camera, of the film's beginning and of what comes `later`; None if nothing is seen
     by two cameras."""
     hull, begun, sets = VisualHull(cameras), len(sets), [telling(masks) for masks in (*sets, *later)]
-    points = [hull.points(masks).points for masks in sets]
-    everywhere = np.concatenate(points) if points else np.zeros((0, 3))
-    if len(everywhere) < FEW_POINTS:
-        return None
-    floor = find_floor(cameras, everywhere, [sets[n] for n in evenly_spread(len(sets), FLOOR_SETS)])
-    seen = [find_people(floor, masks) for masks in sets]
+    with ThreadPoolExecutor(usable_cores(), "census") as pool:
+        points = [surface.points for surface in pool.map(hull.points, sets)]
+        everywhere = np.concatenate(points) if points else np.zeros((0, 3))
+        if len(everywhere) < FEW_POINTS:
+            return None
+        floor = find_floor(cameras, everywhere, [sets[n] for n in evenly_spread(len(sets), FLOOR_SETS)])
+        seen = list(pool.map(lambda masks: find_people(floor, masks), sets))
     numbers, certain = tuple(map(sure_number, seen)), [certain_number(figures) for figures in seen]
     return Census(max(counted(numbers[:begun]), counted(numbers[begun:]), counted(certain, share=0.0)), floor, numbers)
 

@@ -9,6 +9,7 @@ from itertools import chain, islice
 import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.models import WHOLE
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.errors import HARMFUL, NOTED, Caution
 from shadowpuppet.pipeline.footage import FIRST, CameraFrame, Footage, Sample
@@ -22,8 +23,10 @@ from shadowpuppet.pipeline.survey.cautions import (
     GOOD,
     clutter_cautions,
     condition_cautions,
+    feet_cautions,
     recovery_cautions,
     recovery_doubt,
+    sitting_cautions,
     unlike_ready,
 )
 from shadowpuppet.pipeline.survey.film import FilmSurvey, mean_overlap, survey_film
@@ -43,7 +46,7 @@ def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), l
     footage, steps = rig.footage[0], Steps(listener, rig.names, again=bool(hints))
     film = survey_film(footage, options, hint=hints[0] if hints else SceneHint(), steps=steps)
     steps("silhouettes of the first seconds")
-    look = _look(footage, film)
+    look = _look(footage, film, options.tracker.body in WHOLE)
     if look.refusal and not options.anyway:
         return Survey(rig, (film.silhouettes,), (film.silhouettes,), FirstSeconds([], []), look)
     clean = clean_silhouettes(footage, film.sample, film.silhouettes, options)
@@ -61,7 +64,8 @@ def _first_people(sample: Sample, clean: Silhouettes) -> FirstSeconds:
     return FirstSeconds([time for time, _ in people], [(mask,) for _, mask in people], tuple((mask,) for _, mask in spread))
 
 
-def _look(footage: Footage, film: FilmSurvey) -> Look:
+def _look(footage: Footage, film: FilmSurvey, whole: bool) -> Look:
+    """The findings about a film in which a `whole` body, or an upper body, is to be tracked."""
     sample, camera = film.sample, footage.camera
     plain = [mask for frame in sample.frames if (mask := film.silhouettes.plain(frame)) is not None]
     look = Look(
@@ -72,7 +76,9 @@ def _look(footage: Footage, film: FilmSurvey) -> Look:
     )  # fmt: skip
     if look.refusal:
         return look
-    doubts = (*_several_people(film), *_doubts(look, footage),
+    posture = (feet_cautions({camera.name: look.quality.border["bottom"]}) if whole
+               else sitting_cautions(film.masks, [frame.time for frame in sample.frames]))
+    doubts = (*_several_people(film), *posture, *_doubts(look, footage),
               *recovery_cautions([camera.name], [film.silhouettes]), *clutter_cautions(look.left_out))
     return replace(look, doubts=(*doubts, *look.quality.warnings()))
 

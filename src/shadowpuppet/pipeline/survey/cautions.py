@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+import numpy as np
+
+from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
+from shadowpuppet.geometry import Array
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.silhouette.correction.condition import FilmCondition
 
 GOOD = 0.9
 """Overlap with ready silhouettes below which the segmentation is in doubt."""
+AT_TIMES, MOSTLY = 0.1, 0.5
+"""Shares of a camera's frames with cut off feet from which on that is worth a word, and it does not show them."""
+LOWER, SMALLER, OFTEN = 0.25, 0.75, 0.1
+"""How much lower the silhouette's top is, over the root of its area, and how large that area at most, over those while the person stands,
+where they sit; and the least share of such frames. Who bows keeps the area, who turns the height."""
 
 
 def clutter_cautions(left_out: Sequence[str]) -> list[Caution]:
@@ -42,6 +51,41 @@ def recovery_cautions(names: Sequence[str], silhouettes: Sequence[Silhouettes]) 
     return [*said, Caution(f"no picture of the empty scene{of}: it was recovered from the film; {never}what touches the person and has "
                            "like colours may be taken for it; look at the silhouettes, or give background/<camera>.mp4 or --background",
                            "no picture of the empty scene: film one, give --background", NOTED)]
+
+
+def feet_cautions(bottom: Mapping[str, float]) -> list[Caution]:
+    """Feet that are cut off, by the share of each camera's frames in which the person touches the bottom of the picture."""
+    cut = {name: share for name, share in bottom.items() if share > AT_TIMES}
+    if not cut:
+        return []
+    if len(bottom) == 1:
+        return [Caution(f"the feet are cut off at the bottom of the picture in {100 * max(cut.values()):.0f} % of the frames, where they "
+                        "are guessed; step back, or tilt the camera", "feet are cut off: step back, or tilt the camera", HARMFUL)]
+    where = ", ".join(f"camera {name!r} in {100 * share:.0f} % of the frames" for name, share in cut.items())
+    named = " and ".join(map(repr, cut)) if len(cut) < 3 else f"{len(cut)} cameras"
+    shown = sum(share < MOSTLY for share in bottom.values())
+    return [Caution(f"the feet are cut off at the bottom of the picture ({where}): where fewer than two cameras show them they are "
+                    "guessed; step back, or tilt the cameras", f"feet cut off in {named}: step back or tilt",
+                    NOTED if shown > 1 else HARMFUL)]
+
+
+def sitting_cautions(masks: Sequence[Mask], times: Sequence[float]) -> list[Caution]:
+    """That a person whose upper body one camera shows sits down or kneels, by the masks (H, W) of frames with these times (s)."""
+    seen = [n for n, mask in enumerate(masks) if mask.any()]
+    if not seen:
+        return []
+    tops: Array = np.array([masks[n].any(1).argmax() for n in seen], float)
+    areas = np.array([np.count_nonzero(masks[n]) for n in seen], float)
+    standing = tops <= np.percentile(tops, 50)
+    top, area = np.median(tops[standing]), np.median(areas[standing])
+    low = np.flatnonzero((tops > top + LOWER * area**0.5) & (areas < SMALLER * area))
+    if len(low) < max(OFTEN * len(seen), 1):
+        return []
+    since = times[seen[low[0]]]
+    return [Caution(f"in {100 * len(low) / len(seen):.0f} % of the frames, first at {since:.1f} s, the person is lower and smaller in the "
+                    "picture: they sit down, kneel or go away, which an upper body cannot follow; cut the film with --start and --end, or "
+                    "track the whole body with --body anatomical, its feet in the picture",
+                    f"person sits or kneels at {since:.1f} s: cut, or --body anatomical", HARMFUL)]
 
 
 def unlike_ready(overlap: float) -> Caution:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 
 import numpy as np
@@ -15,7 +14,7 @@ from shadowpuppet.pipeline.footage import CameraFrame, Opening, Sample
 from shadowpuppet.pipeline.look import FirstSeconds
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes
-from shadowpuppet.threads import usable_cores
+from shadowpuppet.threads import MadeOnDemand, usable_cores
 from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 
 OPENING, OPENED = 2.0, 40
@@ -54,11 +53,10 @@ def kept_sets(rig: Rig, samples: Sequence[Sample], opening: Opening) -> list[tup
 def _segmented(rig: Rig, silhouettes: Sequence[Silhouettes], sets: Sequence[tuple[CameraFrame, ...]]) -> FirstSeconds:
     share = SharedShadows(rig.cameras)
 
-    def masks(frames: tuple[CameraFrame, ...]) -> tuple[Mask | None, ...]:
-        return share([each.segmented(frame) for each, frame in zip(silhouettes, frames, strict=True)])
+    def masks(n: int) -> tuple[Mask | None, ...]:
+        return share([each.segmented(frame) for each, frame in zip(silhouettes, sets[n], strict=True)])
 
-    with ThreadPoolExecutor(usable_cores(), "look") as pool:
-        return FirstSeconds([frames[rig.leaders[0]].time for frames in sets], list(pool.map(masks, sets)))
+    return FirstSeconds([frames[rig.leaders[0]].time for frames in sets], MadeOnDemand(masks, len(sets)))
 
 
 def _read_sets(rig: Rig, silhouettes: Sequence[Silhouettes], opening: Opening, ready: bool) -> FirstSeconds:

@@ -18,19 +18,22 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.census import Census, later_sets, sampled_sets, take_census
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
-from shadowpuppet.pipeline.survey.cautions import GOOD, clutter_cautions, condition_cautions, recovery_cautions, unlike_ready
+from shadowpuppet.pipeline.survey.cautions import GOOD, clutter_cautions, condition_cautions, feet_cautions, recovery_cautions, unlike_ready
 from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, of_several, survey_film
 from shadowpuppet.pipeline.survey.opening import OPENING, first_seconds, opening_of
 from shadowpuppet.silhouette.added import SceneHint
-from shadowpuppet.threads import usable_cores
+from shadowpuppet.threads import one_opencv_thread, usable_cores
 from shadowpuppet.tracking.people.views import View, views_of
 
 SILHOUETTES_OR_CAMERAS = "silhouettes do not fit together: film the empty scene, or calibrate"
 """Ten words on an agreement that an empty scene recovered from the film may have spoiled."""
+ENOUGH = 3
+"""Number of cameras that show all of the person, with which it does no harm that others do not."""
 RATES, LENGTHS = 0.02, 0.1
 """Relative difference of rates, and difference of lengths (s), above which films are reported to differ."""
 
 
+@one_opencv_thread()
 def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), listener: Listener | None = None) -> Survey:
     """Examine each camera's film, and the first seconds of all together; `hints` as in `survey_film`, by camera. Raises a
     `ShadowPuppetError` if something cannot be used."""
@@ -106,7 +109,8 @@ def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
     bad = [(camera.name, why) for camera in look.cameras if (why := camera.quality.refusal())]
     if len(look.cameras) - len(bad) < 2:
         return "; ".join(f"camera {name!r}: {why}" for name, why in bad[:2])
-    if not any(sum(mask is not None and may_be_person(mask) for mask in masks) > 1 for masks in first.masks):
+    sets = (first.masks[n] for n in range(len(first.masks)))  # one after another: the first will do, and the others need not be made
+    if not any(sum(mask is not None and may_be_person(mask) for mask in masks) > 1 for masks in sets):
         return (f"no two cameras see a person at the same time within the first {OPENING:g} s: do the films belong together, and begin "
                 "together? say in [start] of recording.toml when each began")
     return look.agreement.refusal()
@@ -129,10 +133,13 @@ def _rig_doubts(look: RigLook, several: bool = False, recovered: frozenset[str] 
         listed = ", ".join(f"{name} {end:.2f}" for name, end in ends.items())
         doubts.append(Caution(f"the films have different lengths (s: {listed}): were they begun together? say in [start] of recording.toml "
                               "when each began", "films differ in length: begun together? see [start]", NOTED))
+    whole = sum(not camera.quality.cut_off and not camera.quality.refusal() for camera in look.cameras)
+    if not several:
+        doubts += feet_cautions({camera.name: camera.quality.border["bottom"] for camera in look.cameras if not camera.quality.refusal()})
     for camera in look.cameras:
         if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
             doubts.append(unlike_ready(camera.exact_overlap).about(f"camera {camera.name!r}"))
-        quality = () if several else camera.quality.warnings()
+        quality = () if several else camera.quality.warnings(whole >= ENOUGH)
         warnings = (*condition_cautions(camera.condition, camera.name in recovered), *clutter_cautions(camera.left_out), *quality)
         doubts += [warning.about(f"camera {camera.name!r}").at_most(HARMFUL) for warning in warnings]
         doubts += [Caution(f"camera {camera.name!r}: {why}", f"camera {camera.name!r} shows no usable silhouette", HARMFUL)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.silhouette.background import Image, smoothed, to_planes
 from shadowpuppet.silhouette.boundary import disc
+from shadowpuppet.silhouette.cleanup import bounding_window
 
 FAST = 4
 """Radius (pixels) of discs that fit into what is covered or uncovered within two frames; outlines of slower limbs are mixed anyway."""
@@ -20,6 +21,8 @@ LEAST_CONTRAST = 30.0
 """Least difference of limb and background, grey levels over Y, Cr, Cb together."""
 MIXED = (0.3, 0.7)
 """Shares of the limb in a mixture."""
+FEWEST = 3
+"""Least number of consecutive frames that tell anything."""
 LEAST_PIXELS = 25
 """Least number of pixels that tell anything."""
 
@@ -31,7 +34,11 @@ def blurred_share(runs: Sequence[Sequence[Image]], masks: Sequence[Sequence[NDAr
     """
     shares = [np.zeros(0)]
     for images, found in zip(runs, masks, strict=True):
-        planes = [smoothed(to_planes(image)).astype(np.float32) for image in images]
+        if len(images) < FEWEST:
+            continue
+        window = bounding_window(np.logical_or.reduce(found).view(np.uint8), FAST + 1)
+        planes = [smoothed(to_planes(np.ascontiguousarray(image[window]))).astype(np.float32) for image in images]
+        found = [mask[window] for mask in found]
         for n in range(1, len(images) - 1):
             shares += [_limb_shares(planes[n + a], planes[n], planes[n + b], found[n + b] & ~found[n + a]) for a, b in ((-1, 1), (1, -1))]
     shares = np.concatenate(shares)

@@ -18,7 +18,7 @@ from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
 from shadowpuppet.threads import usable_cores
-from shadowpuppet.tracking.people.floor import ASIDE, HEIGHTS, LEGS, TRUNK, Floor, figure_points, floor_under, pixel_index
+from shadowpuppet.tracking.people.floor import ASIDE, HEIGHTS, LEGS, TRUNK, Floor, Ground, figure_points, floor_under, pixel_index
 
 NEEDED = 0.65
 """Least evidence for a person, in views: the share of the figure that is silhouette and not another person's, less `EMPTY` times the share
@@ -40,8 +40,8 @@ NONE, NEW, KNOWN = 0, 1, 2
 
 TRIED_REACH, TRIED_NEAR = 0.3, 0.5
 """Distance (m) beyond the surface points to which floors reach that are only tried, and greatest distance of their places from a point."""
-COARSE, FINE = np.array([-0.1, 0.0, 0.1]), np.arange(-3, 4) * 0.05
-"""Levels (m) of the floor that are tried about the best so far, one after the other."""
+COARSE, FINE = np.array([-10, 0, 10]), np.arange(-15, 20, 5)
+"""Levels (cm) of the floor that are tried about the best so far, one after the other."""
 ALIKE = 0.95
 """Share of the greatest evidence from which a level counts as alike."""
 
@@ -101,22 +101,26 @@ def _without_ghosts(floor: Floor, masks: Sequence[Mask | None], explained: Seque
 def find_floor(cameras: Sequence[Camera], points: Array, sets: Sequence[Sequence[Mask | None]]) -> Floor:
     """The floor on which figures explain most of some frame sets' masks (H, W). `points`: surface points (P, 3), world, metres, of all
     people. Where few cameras see a person the hull reaches below the floor, so that the lowest points alone do not say where it is."""
-    def evidence(level: float) -> float:
-        floor = floor_under(cameras, points, level, TRIED_REACH, TRIED_NEAR)
+    ground, tried = Ground.under(cameras, points, TRIED_REACH, TRIED_NEAR), dict[int, float]()
+
+    def evidence(level: int) -> float:
+        floor = ground.at(level / 100)
         return sum(figure.evidence for masks in sets for figure in find_people(floor, masks))
 
-    def best(levels: Array) -> float:
-        return float(levels[np.argmax(list(pool.map(evidence, levels)))])
+    def evidences(levels: NDArray[np.int64]) -> Array:
+        new = [level for level in dict.fromkeys(levels.tolist()) if level not in tried]
+        tried.update(zip(new, pool.map(evidence, new)))
+        return np.array([tried[level] for level in levels.tolist()])
 
     with ThreadPoolExecutor(usable_cores(), "floor") as pool:
-        about = best(np.array([0.0, *np.percentile(points[:, 2], (0.5, 2, 5, 10))]))
-        about = best(about + COARSE)
-        levels = about + FINE
-        found, at_zero = np.array(list(pool.map(evidence, levels))), evidence(0.0)
+        levels = np.rint(100 * np.array([0.0, *np.percentile(points[:, 2], (0.5, 2, 5, 10))])).astype(np.int64)
+        levels = levels[np.argmax(evidences(levels))] + COARSE
+        levels = levels[np.argmax(evidences(levels))] + FINE
+        found, (at_zero,) = evidences(levels), evidences(np.zeros(1, np.int64))
     if at_zero >= ALIKE * found.max():
         return floor_under(cameras, points, 0.0)  # the world's, by convention: where silhouettes lack feet figures fit many levels alike
     # evidence changes little within some centimetres, so that the greatest is chance: the middle of the levels with nearly as much
-    return floor_under(cameras, points, float(np.average(levels, weights=np.maximum(found - ALIKE * found.max(), 1e-9))))
+    return floor_under(cameras, points, float(np.average(levels, weights=np.maximum(found - ALIKE * found.max(), 1e-9))) / 100)
 
 
 def telling(masks: Sequence[Mask | None]) -> list[Mask | None]:

@@ -8,6 +8,7 @@ boxes with silhouettes so.)
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -31,8 +32,9 @@ LEGS, ASIDE = (0.06, 0.17, 0.28, 0.39), (-0.25, -0.12, 0.0, 0.12, 0.25)
 OVER, UNDER = 0.15, -0.15
 """Places of the guards: above the head, and above the floor, metres."""
 
-NODES = 9
-"""Number of heights between which points are interpolated."""
+SPACING = 0.275
+"""Distance of neighbouring heights at which points are projected, and between which they are interpolated, metres: the heights are
+multiples of it, so that floors at several levels share them."""
 
 
 class Floor(NamedTuple):
@@ -53,34 +55,61 @@ class Floor(NamedTuple):
 def floor_under(cameras: Sequence[Camera], points: Array, level: float, reach: float = REACH, near: float = np.inf) -> Floor:
     """The floor at a `level`, metres, below surface points (P, 3), world, metres, of all people, and `reach` beyond them; only places that
     have a point at most `near` from them."""
-    from scipy.spatial import KDTree
-
-    middle = np.median(points[:, :2], axis=0)
-    low = np.maximum(np.percentile(points[:, :2], 1, axis=0) - reach, middle - HALF_WIDTH)
-    high = np.minimum(np.percentile(points[:, :2], 99, axis=0) + reach, middle + HALF_WIDTH)
-    pitch = next((each for each in PITCHES if np.prod(np.ceil((high - low) / each)) <= MOST_PLACES), PITCHES[-1])
-    x, y = (np.arange(start, end, pitch) for start, end in zip(low, high))
-    places = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
-    if np.isfinite(near):
-        places = places[KDTree(points[:, :2]).query(places, distance_upper_bound=near)[0] <= near]
-    pixels = np.stack([_pixels(camera, places, level) for camera in cameras], 2)
-    return Floor(tuple(cameras), level, places, pitch, pixels)
+    return Ground.under(cameras, points, reach, near).at(level)
 
 
-def _pixels(camera: Camera, places: Array, level: float) -> NDArray[np.int32]:
-    """Of the figures at places (N, 2), in one camera: (N, heights, points). A few points are projected, the others lie between them."""
-    nodes, sides = np.linspace(UNDER, HEIGHTS[-1] + OVER, NODES), np.array([ASIDE[0], 0.0, ASIDE[-1]])
-    exact = camera.project(figure_points(camera, places, level + nodes.repeat(3), np.tile(sides, NODES)))
-    exact = exact.reshape(len(places), NODES, 3, 2).astype(np.float32)
-    found = np.empty((len(places), len(HEIGHTS), POINTS), np.int32)
-    for n, height in enumerate(HEIGHTS):
-        rows = [(share * height, aside) for share, aside in TRUNK] + [(share * height, ASIDE) for share in LEGS]
-        rows += [(height + OVER, (-0.03, 0.0, 0.03)), (UNDER, ASIDE)]
-        up = (np.array([z for z, aside in rows for _ in aside]) - UNDER) / (nodes[1] - nodes[0])
-        across = np.array([each for _, aside in rows for each in aside]) / ASIDE[-1] + 1
-        k, m = np.clip(up.astype(int), 0, NODES - 2), np.clip(across.astype(int), 0, 1)
-        _between(exact, k, m, (up - k).astype(np.float32), (across - m).astype(np.float32), _halved(camera), found[:, n])
-    return found
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Places whose floor may be at any level; what floors at several levels have in common is projected once."""
+
+    cameras: tuple[Camera, ...]
+    places: Array
+    """Of shape (N, 2), world, metres."""
+    pitch: float
+    """Distance of neighbouring places, metres."""
+    projected: dict[tuple[int, int], NDArray[np.float32]] = field(default_factory=dict)
+    """By camera and height, in multiples of `SPACING`: pixels (N, 3, 2) of the points at `ASIDE`'s ends and middle."""
+
+    @classmethod
+    def under(cls, cameras: Sequence[Camera], points: Array, reach: float = REACH, near: float = np.inf) -> Ground:
+        """As `floor_under`."""
+        from scipy.spatial import KDTree
+
+        middle = np.median(points[:, :2], axis=0)
+        low = np.maximum(np.percentile(points[:, :2], 1, axis=0) - reach, middle - HALF_WIDTH)
+        high = np.minimum(np.percentile(points[:, :2], 99, axis=0) + reach, middle + HALF_WIDTH)
+        pitch = next((each for each in PITCHES if np.prod(np.ceil((high - low) / each)) <= MOST_PLACES), PITCHES[-1])
+        x, y = (np.arange(start, end, pitch) for start, end in zip(low, high))
+        places = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
+        if np.isfinite(near):
+            places = places[KDTree(points[:, :2]).query(places, distance_upper_bound=near)[0] <= near]
+        return cls(tuple(cameras), places, pitch)
+
+    def at(self, level: float) -> Floor:
+        """The floor at a level, metres."""
+        pixels = np.stack([self._pixels(n, level) for n in range(len(self.cameras))], 2)
+        return Floor(self.cameras, level, self.places, self.pitch, pixels)
+
+    def _pixels(self, n: int, level: float) -> NDArray[np.int32]:
+        """Of the figures on the floor at a level, in one camera: (N, heights, points)."""
+        first, last = (int(np.floor((level + z) / SPACING)) for z in (UNDER, HEIGHTS[-1] + OVER))
+        exact = np.stack([self._projected(n, k) for k in range(first, last + 2)], 1)
+        found = np.empty((len(self.places), len(HEIGHTS), POINTS), np.int32)
+        for h, height in enumerate(HEIGHTS):
+            rows = [(share * height, aside) for share, aside in TRUNK] + [(share * height, ASIDE) for share in LEGS]
+            rows += [(height + OVER, (-0.03, 0.0, 0.03)), (UNDER, ASIDE)]
+            up = (level + np.array([z for z, aside in rows for _ in aside])) / SPACING - first
+            across = np.array([each for _, aside in rows for each in aside]) / ASIDE[-1] + 1
+            k, m = np.clip(up.astype(int), 0, last - first), np.clip(across.astype(int), 0, 1)
+            _between(exact, k, m, (up - k).astype(np.float32), (across - m).astype(np.float32), _halved(self.cameras[n]), found[:, h])
+        return found
+
+    def _projected(self, n: int, k: int) -> NDArray[np.float32]:
+        if (n, k) not in self.projected:
+            sides = np.array([ASIDE[0], 0.0, ASIDE[-1]])
+            points = figure_points(self.cameras[n], self.places, np.full(3, k * SPACING), sides)
+            self.projected[n, k] = self.cameras[n].project(points).astype(np.float32)
+        return self.projected[n, k]
 
 
 @kernel
