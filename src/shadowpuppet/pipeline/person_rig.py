@@ -41,7 +41,7 @@ from shadowpuppet.tracking.unexplained import Unexplained, left_out, looks_in
 from shadowpuppet.video import Image
 
 SURE_OVERLAP = 0.8
-"""Overlap below which an estimated height is doubted: of 17 made people those below were 6 to 20 cm off, the others 8 cm at most."""
+"""Overlap below which an estimated height is doubted: of 12 made people those below were 6 to 20 cm off, the others 8 cm at most."""
 
 
 class HullObservation(NamedTuple):
