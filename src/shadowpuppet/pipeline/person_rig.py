@@ -151,7 +151,7 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
         sizes = dressed(average_sizes(settings.body, tall))
         source = f"{'the height' if height else f'a height of {tall:.2f} m as seen'}, and the hulls of the first seconds"
         assert isinstance(sizes, BoneSizes)
-        spread, shared = size_deviations(sizes, shown=False), shared_deviations(sizes, tall=not height)
+        spread, shared = size_deviations(sizes, shown=False), None if height else shared_deviations(sizes)
     library = known.poses if len(known.poses) else None
     person = estimate_sizes(rng, partial(make_body, settings.body), sizes, spread, cameras, first, settings, library,
                             len(first) // 2 if settings.patience else 0, shared, begin)

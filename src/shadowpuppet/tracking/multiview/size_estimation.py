@@ -82,11 +82,12 @@ def size_deviations(sizes: BoneSizes, shown: bool) -> Array:
     return np.array([JOINT_DEVIATION if shown and name in SIZES_FROM_JOINTS else shares[name][1] * stature for name in sizes.names()])
 
 
-def shared_deviations(sizes: BoneSizes, tall: bool) -> Array:
-    """Deviations (S, K), metres, that the sizes of people have together, as in `solve_bundle`: girth, and stature where `tall`."""
+def shared_deviations(sizes: BoneSizes) -> Array:
+    """Deviations (2, K), metres, that sizes have together about those of an estimated height, as in `solve_bundle`: stature, and girth. Of
+    a known height neither: where few cameras see the person the hull is too wide, and girths grow with it until arms vanish in the trunk."""
     values = sizes.to_array()
     girth = GIRTH_DEVIATION * np.where(_is_width(type(sizes)), values, 0.0)
-    return np.array([girth, STATURE_DEVIATION / stature_of(dict(zip(sizes.names(), values))) * values] if tall else [girth])
+    return np.array([STATURE_DEVIATION / stature_of(dict(zip(sizes.names(), values))) * values, girth])
 
 
 def dressed(sizes: Measured) -> Measured:
