@@ -84,7 +84,7 @@ def size_deviations(sizes: BoneSizes, shown: bool) -> Array:
 
 def shared_deviations(sizes: BoneSizes) -> Array:
     """Deviations (2, K), metres, that sizes have together about those of an estimated height, as in `solve_bundle`: stature, and girth.
-    With a known height neither: where few cameras see the person the hull is too wide, and girths grow with it until arms vanish in the trunk."""
+    With a known height neither: few cameras' hulls are too wide, and girths would grow with them until arms vanish in the trunk."""
     values = sizes.to_array()
     girth = GIRTH_DEVIATION * np.where(_is_width(type(sizes)), values, 0.0)
     return np.array([STATURE_DEVIATION / stature_of(dict(zip(sizes.names(), values))) * values, girth])
