@@ -123,7 +123,7 @@ def test_who_is_found_in_a_later_frame_is_followed_back_to_the_first():
     found = size_estimation._followed(np.random.default_rng(0), tracker, first, 3)
     assert {n for n, _ in found} >= set(range(1, len(first)))
     assert seen[0] is first[3][1]
-    assert actor.apart(tracker.body, np.array([state.pose for _, state in found]), stout()[1]).max() < 0.05
+    assert actor.apart(tracker.body, np.array([state.pose for _, state in found]), stout()[1][[n for n, _ in found]]).max() < 0.05
 
 
 # What is known before -------------------------------------------------------------------------------------------------

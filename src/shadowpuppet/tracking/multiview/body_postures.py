@@ -13,7 +13,6 @@ from functools import cache, cached_property
 from importlib import resources
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from shadowpuppet.geometry import Array, unit
 from shadowpuppet.jit import device, kernel
@@ -84,9 +83,8 @@ class BodyPostures:
     def _constants(self) -> tuple[Array, Array]:
         """Inverse Cholesky factors (K, 27, 27) of the covariances, and log densities (K,) at the means, half of the weight included."""
         lower = np.linalg.cholesky(self.covariances)
-        inverse = np.stack([solve_triangular(one, np.eye(D), lower=True) for one in lower])
         half_determinants = np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(1)
-        return inverse, np.log(self.weights / 2) - half_determinants - 0.5 * D * np.log(2 * np.pi)
+        return np.tril(np.linalg.inv(lower)), np.log(self.weights / 2) - half_determinants - 0.5 * D * np.log(2 * np.pi)
 
     @cached_property
     def _usual(self) -> float:
