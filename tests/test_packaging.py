@@ -205,6 +205,7 @@ def test_nothing_tells_of_this_machine():
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False).stdout.split()
     if not tracked:
         pytest.skip("not a checkout")
-    texts = {name: (ROOT / name).read_text("utf-8") for name in tracked if not name.endswith((".png", ".webp", ".npz")) and (ROOT / name).exists()}
+    texts = {name: (ROOT / name).read_text("utf-8") for name in tracked
+             if not name.endswith((".png", ".webp", ".npz")) and (ROOT / name).exists()}
     machine = re.compile("/" + r"(work|root|home|Users)/\w|index" + "-url")
     assert [name for name, text in texts.items() if machine.search(text)] == []
