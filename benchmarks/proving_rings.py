@@ -152,7 +152,7 @@ class Case:
 
 
 def with_cameras(spec: Spec, n: int, cameras: int) -> Spec:
-    """The n-th spec's motion by another person, with so many cameras elsewhere, in another room, and no training motion."""
+    """The motion of the n-th spec by another person in another room, before `cameras` cameras at other places, without training motion."""
     assert spec.ring is not None
     seed = 1000 * cameras + n
     rng, name = np.random.default_rng(seed), spec.name
@@ -209,7 +209,7 @@ def main() -> None:
     parser.add_argument("--rows", default="", help="names, with ; between them: " + "; ".join(ROWS))
     parser.add_argument("--recordings", default="", help="names, with ; between them; all without")
     parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--cameras", type=int, help="other people and so many cameras; without, the rings as they are")
+    parser.add_argument("--cameras", type=int, help="number of cameras of films of other people; default: the rings as they are")
     parser.add_argument("--masks", action="store_true", help="exact silhouettes in place of those of the films")
     parser.add_argument("--frames", type=int, default=10**6, help="so many of each, at most")
     parser.add_argument("--folder", type=Path, help="where the recordings are, or are made")

@@ -18,10 +18,9 @@ import smallest
 from shadowpuppet.camera.rasterize import pack
 from shadowpuppet.evaluation.bench.mono_cases import MonoCase
 from shadowpuppet.evaluation.bench.multi_cases import MultiCase
-from shadowpuppet.evaluation.bench.opencv import one_thread
 from shadowpuppet.evaluation.bench.timing import Contender, in_turns
 from shadowpuppet.geometry import Array
-from shadowpuppet.threads import one_blas_thread
+from shadowpuppet.threads import one_blas_thread, one_opencv_thread
 
 PICTURE = Path(__file__).resolve().parent.parent / "docs" / "assets" / "speed.png"
 VALUES = {"particles": (10, 20, 50, 100, 200, 500, 1000, 2000, 5000), "width": (80, 160, 320, 640, 1280, 1920),
@@ -120,7 +119,7 @@ def main() -> None:
     if args.quick:
         values, values_multi = ({axis: some[:2] for axis, some in every.items()} for every in (VALUES, VALUES_MULTI))
         case = {"points": 100, "particles": 3, "size": (160, 120)}
-    with one_thread(), one_blas_thread():
+    with one_opencv_thread(), one_blas_thread():
         mono = mono_curves(values, 1 if args.quick else 9)
         multi = multi_curves(values_multi, 1 if args.quick else 5, **case)
     plot([(mono, values, LABELS, "microseconds a particle"),

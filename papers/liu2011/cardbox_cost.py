@@ -12,9 +12,9 @@ from papers.liu2011.repeats import repeat
 from papers.liu2011.shown import told
 from papers.liu2011.sweeps import Measured, measured
 from shadowpuppet.evaluation.bench.mono_cases import MonoCase as Drawn
-from shadowpuppet.evaluation.bench.opencv import OpenCV, one_thread
+from shadowpuppet.evaluation.bench.opencv import OpenCV
 from shadowpuppet.evaluation.bench.timing import Contender, in_turns
-from shadowpuppet.threads import one_blas_thread
+from shadowpuppet.threads import one_blas_thread, one_opencv_thread
 
 BODIES = {"cardbox": "cardbox", "boxes": "volumetric (boxes)"}
 SIZES, FEW = ((160, 120), (320, 240), (640, 480), (1280, 960)), ((160, 120), (320, 240))
@@ -53,7 +53,7 @@ def drawn(sizes: tuple[tuple[int, int], ...], rounds: int) -> Times:
             runs[body, "ours", size] = Contender(what.run, what.particles)
             runs[body, "OpenCV", size] = Contender(OpenCV(what).run, what.particles)
     names = {repr(key): key for key in runs}
-    with one_blas_thread(), one_thread():
+    with one_blas_thread(), one_opencv_thread():
         timed = in_turns({name: runs[key] for name, key in names.items()}, rounds)
     return {names[name]: 1e6 * each.least for name, each in timed.items()}
 

@@ -13,10 +13,9 @@ from papers.common.plotting import COLOURS, label, new_figure
 from papers.liu2011.material import Case, cases
 from papers.liu2011.repeats import with_method
 from papers.liu2011.shown import stem, told
-from shadowpuppet.evaluation.bench.opencv import one_thread
 from shadowpuppet.evaluation.bench.timing import Contender
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
-from shadowpuppet.threads import one_blas_thread
+from shadowpuppet.threads import one_blas_thread, one_opencv_thread
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 from shadowpuppet.video import Image
 
@@ -30,7 +29,7 @@ FRAMES, ROUNDS = 30, 9
 def make(request: Request) -> Outcome:
     """Each recording, one thread."""
     outcome = Outcome()
-    with one_blas_thread(), one_thread():
+    with one_blas_thread(), one_opencv_thread():
         for case in cases(request):
             name, numbers = stem("frame_rate", request, case), FEW if request.short else NUMBERS
             rounds = 2 if request.short else ROUNDS

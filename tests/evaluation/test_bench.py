@@ -16,9 +16,10 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.bench import chain, mono, multi, naive_mono, run
 from shadowpuppet.evaluation.bench.mono_cases import MonoCase, MonoFollower
 from shadowpuppet.evaluation.bench.multi_cases import MultiCase
-from shadowpuppet.evaluation.bench.opencv import OpenCV, one_thread
+from shadowpuppet.evaluation.bench.opencv import OpenCV
 from shadowpuppet.evaluation.bench.run import check_writable, write_figures
 from shadowpuppet.evaluation.bench.timing import Contender, Times, in_turns
+from shadowpuppet.threads import one_opencv_thread
 from shadowpuppet.tracking.monocular.settings import make_settings
 from shadowpuppet.tracking.monocular.stages import FilterStage
 from shadowpuppet.tracking.silhouette_cost import Observation, silhouette_costs
@@ -99,7 +100,7 @@ def test_ratios_are_of_the_least_times_and_all_else_of_medians():
 def test_particles_are_many_times_faster_than_by_opencv(stage, margin):
     """Poses to costs, beside OpenCV with its polygons ready-made: 12 and 20 times where AVX-512 is; the guard leaves a margin of two."""
     case = MonoCase(stage=stage)
-    with one_thread():
+    with one_opencv_thread():
         spent = in_turns({"bits": Contender(case.run), "OpenCV": Contender(OpenCV(case).run)}, 15)
     assert spent["OpenCV"].least > margin * spent["bits"].least, spent
 

@@ -253,8 +253,9 @@ def test_limbs_that_reach_out_of_silhouettes_cost_what_their_equations_say(rng):
         model = bundle_adjustment._model(anatomical(AnatomicalSizes.from_array(sizes)), lengths)
         return float(bundle_adjustment._reaching(model, at, space, 2.0, origin)[8].sum())
 
-    nudged = bundle_adjustment._nudged(anatomical, AnatomicalSizes, mean, free)
-    frame = bundle_adjustment._equations(bundle_adjustment._model(anatomical(MEAN)), nudged, other, nothing, SurfaceSettings(), space, 2.0)
+    nudged = bundle_adjustment._nudged(anatomical, AnatomicalSizes, mean, free, lengths)
+    model = bundle_adjustment._model(anatomical(MEAN), lengths)
+    frame = bundle_adjustment._equations(model, nudged, other, nothing, SurfaceSettings(), space, 2.0)
     numeric = [(cost(other + step, mean) - cost(other - step, mean)) / 2e-3 for step in 1e-3 * np.eye(len(other))]
     numeric += [(cost(other, mean + step) - cost(other, mean - step)) / 2e-3 for step in 1e-3 * np.eye(len(mean))[free]]
     assert frame.cost == pytest.approx(cost(other, mean))
@@ -263,7 +264,7 @@ def test_limbs_that_reach_out_of_silhouettes_cost_what_their_equations_say(rng):
 
 
 def test_bones_do_not_grow_into_empty_space_nor_shrink_for_one_camera():
-    """Shanks taken to be too long, and of which no points are seen: silhouettes hold them, but not one that lacks a leg."""
+    """Shanks without surface points, expected too long: silhouettes shorten them, but not a single silhouette that lacks a leg."""
     body, poses = anatomical(MEAN), actor.walk(actor.body().skeleton, 3, 4.0)
     rng, long = np.random.default_rng(4), MEAN.with_values(shank_length=1.2 * MEAN.shank_length)
     seen = [actor.surface(body, pose, rng, 30) for pose in poses]

@@ -9,10 +9,11 @@ import numpy as np
 from shadowpuppet.evaluation.bench import naive_mono
 from shadowpuppet.evaluation.bench.chain import WAVING, chain_figures, measure_chain, start_times
 from shadowpuppet.evaluation.bench.mono_cases import MonoCase, MonoFollower
-from shadowpuppet.evaluation.bench.opencv import OpenCV, one_thread
+from shadowpuppet.evaluation.bench.opencv import OpenCV
 from shadowpuppet.evaluation.bench.silhouette_cases import SilhouetteCase
 from shadowpuppet.evaluation.bench.timing import Contender, Figures, Times, in_turns
 from shadowpuppet.pipeline.track import Listener
+from shadowpuppet.threads import one_opencv_thread
 from shadowpuppet.tracking.monocular.settings import make_settings
 
 ROUNDS, QUICK_ROUNDS = 41, 7
@@ -37,7 +38,7 @@ FIGURES = Figures(
 def run_mono(quick: bool, listener: Listener) -> tuple[dict[str, Any], dict[str, Times]]:
     """All `mono.*` figures by flat keys, and the times they come from. Raises `ShadowPuppetError` if a part of it fails."""
     listener.begin("particles and frames, in turns")
-    with one_thread():
+    with one_opencv_thread():
         raw = in_turns(contenders(), QUICK_ROUNDS if quick else ROUNDS)
     out: dict[str, Any] = FIGURES.of(raw)
     listener.begin("a long film")

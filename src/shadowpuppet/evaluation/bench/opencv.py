@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import numpy as np
 
 from shadowpuppet.evaluation.bench.mono_cases import MonoCase
@@ -37,16 +34,3 @@ class OpenCV:
             cv2.bitwise_xor(self.drawn, self.mask, self.differs)
             out[n] = cv2.countNonZero(self.differs)
         return out
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Context in which OpenCV uses one thread."""
-    import cv2
-
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        yield
-    finally:
-        cv2.setNumThreads(threads)

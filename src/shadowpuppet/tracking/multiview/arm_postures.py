@@ -35,15 +35,20 @@ def arm_directions(joints: Array) -> Array:
     """Directions of upper arm and forearm (..., 2, 6) of both arms, from `JOINTS` (..., 8, 3), world: to the right, forward, and up in the
     trunk's frame. A left arm is mirrored: both are right ones."""
     pelvis, neck, *arms = np.moveaxis(joints, -2, 0)
-    up = unit(neck - pelvis)
-    across = arms[3] - arms[0]
-    right = unit(across - (across * up).sum(-1, keepdims=True) * up)
-    frame = np.stack([right, np.cross(up, right), up], -2)
+    frame = trunk_frame(pelvis, neck, arms[0], arms[3])
     found = []
     for shoulder, elbow, wrist in (arms[:3], arms[3:]):
         bones = np.stack([unit(elbow - shoulder), unit(wrist - elbow)], -2)
         found.append(np.einsum("...ij,...bj->...bi", frame, bones).reshape(*bones.shape[:-2], 6))
     return np.stack([found[0] * MIRRORED, found[1]], -2)
+
+
+def trunk_frame(pelvis: Array, neck: Array, left_shoulder: Array, right_shoulder: Array) -> Array:
+    """Axes (..., 3, 3) of the trunk, to the right, forward and up, as rows, world, from joints (..., 3)."""
+    up = unit(neck - pelvis)
+    across = right_shoulder - left_shoulder
+    right = unit(across - (across * up).sum(-1, keepdims=True) * up)
+    return np.stack([right, np.cross(up, right), up], -2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,10 +126,15 @@ def _rarities(joints, means, precisions, offsets, uniform, greatest, out):  # pr
                         + r * (P[2, 2] * r + 2 * (P[2, 3] * s + P[2, 4] * t + P[2, 5] * u))
                         + s * (P[3, 3] * s + 2 * (P[3, 4] * t + P[3, 5] * u))
                         + t * (P[4, 4] * t + 2 * P[4, 5] * u) + u * P[5, 5] * u)  # fmt: skip
-                one = offsets[k] - 0.5 * away
-                high, low = max(density, one), min(density, one)
-                density = high + np.log1p(np.exp(low - high))
+                density = log_added(density, offsets[k] - 0.5 * away)
             out[n] += max(greatest - density, 0.0)
+
+
+@device
+def log_added(first, second):  # pragma: no cover
+    """Logarithm of the sum of two numbers, from their logarithms."""
+    high, low = max(first, second), min(first, second)
+    return high + np.log1p(np.exp(low - high))
 
 
 @device

@@ -16,6 +16,7 @@ import numpy as np
 
 from shadowpuppet.geometry import Array, unit
 from shadowpuppet.jit import device, kernel
+from shadowpuppet.tracking.multiview.arm_postures import log_added, trunk_frame
 
 TABLE = "body_postures.npz"
 """The mixture, as `benchmarks/fit_body_postures.py` writes it."""
@@ -33,13 +34,10 @@ NEGLIGIBLE = 30.0
 def body_directions(joints: Array) -> Array:
     """Directions (..., 27) from `JOINTS` (..., 14, 3), world: of left upper arm, forearm, thigh and shank, the right ones, and the world's
     up; each to the right, forward and up in the trunk's frame."""
-    pelvis, neck = joints[..., 0, :], joints[..., 1, :]
-    up = unit(neck - pelvis)
-    across = joints[..., 8, :] - joints[..., 2, :]
-    right = unit(across - (across * up).sum(-1, keepdims=True) * up)
-    frame = np.stack([right, np.cross(up, right), up], -2)
-    bones = [unit(joints[..., j + 1, :] - joints[..., j, :]) for first in (2, 5, 8, 11) for j in (first, first + 1)]
-    directions = np.stack([*bones, np.broadcast_to([0.0, 0.0, 1.0], up.shape)], -2)
+    at = np.moveaxis(joints, -2, 0)
+    frame = trunk_frame(at[0], at[1], at[2], at[8])
+    bones = [unit(at[j + 1] - at[j]) for first in (2, 5, 8, 11) for j in (first, first + 1)]
+    directions = np.stack([*bones, np.broadcast_to([0.0, 0.0, 1.0], at[0].shape)], -2)
     return np.einsum("...ij,...bj->...bi", frame, directions).reshape(*directions.shape[:-2], D)
 
 
@@ -62,8 +60,12 @@ class BodyPostures:
 
     def rarity(self, directions: Array) -> Array:
         """How rare directions (N, 27) are, (N,): minus the log density, plus the median of the components' means'; at most `FLOOR`."""
+        return self._usual - np.logaddexp(self.log_density(directions), self._usual - FLOOR)
+
+    def log_density(self, directions: Array) -> Array:
+        """Log density (N,) of directions (N, 27)."""
         both = np.logaddexp(self.log_parts(directions), self.log_parts(mirrored(directions)))
-        return self._usual - np.logaddexp(np.logaddexp.reduce(both, axis=1), self._usual - FLOOR)
+        return np.logaddexp.reduce(both, axis=1)
 
     def log_parts(self, directions: Array) -> Array:
         """Log density (N, K) of directions (N, 27) under each component, half of its weight included."""
@@ -84,13 +86,12 @@ class BodyPostures:
         """Inverse Cholesky factors (K, 27, 27) of the covariances, and log densities (K,) at the means, half of the weight included."""
         lower = np.linalg.cholesky(self.covariances)
         half_determinants = np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(1)
-        return np.tril(np.linalg.inv(lower)), np.log(self.weights / 2) - half_determinants - 0.5 * D * np.log(2 * np.pi)
+        return np.asarray(np.tril(np.linalg.inv(lower)), float), np.log(self.weights / 2) - half_determinants - 0.5 * D * np.log(2 * np.pi)
 
     @cached_property
     def _usual(self) -> float:
         """Log density at the components' means, their median."""
-        both = np.logaddexp(self.log_parts(self.means), self.log_parts(mirrored(self.means)))
-        return float(np.median(np.logaddexp.reduce(both, axis=1)))
+        return float(np.median(self.log_density(self.means)))
 
 
 @cache
@@ -108,8 +109,8 @@ def _rarities(directions, others, means, factors, offsets, usual, out):  # pragm
     for n in range(directions.shape[0]):
         density = usual - FLOOR
         for k in range(means.shape[0]):
-            density = _added(density, _log_part(directions[n], means[k], factors[k], offsets[k], density - NEGLIGIBLE))
-            density = _added(density, _log_part(others[n], means[k], factors[k], offsets[k], density - NEGLIGIBLE))
+            density = log_added(density, _log_part(directions[n], means[k], factors[k], offsets[k], density - NEGLIGIBLE))
+            density = log_added(density, _log_part(others[n], means[k], factors[k], offsets[k], density - NEGLIGIBLE))
         out[n] = usual - density
 
 
@@ -125,10 +126,3 @@ def _log_part(at, mean, factor, offset, least):  # pragma: no cover
             sum_ += factor[i, j] * (at[j] - mean[j])
         density -= 0.5 * sum_ * sum_
     return density
-
-
-@device
-def _added(one, other):  # pragma: no cover
-    """The logarithm of the sum of two numbers of which logarithms are given."""
-    high, low = max(one, other), min(one, other)
-    return high + np.log1p(np.exp(low - high))

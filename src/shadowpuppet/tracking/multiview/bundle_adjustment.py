@@ -60,8 +60,8 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
 
     `spread` (K,): standard deviations (m) of the expected sizes, 0 for fixed ones. `shared` (S, K): deviations that sizes have together,
     each row for one standard deviation of a common cause, such as the stature. `spaces`, one per frame, and `emptiness`: silhouettes that
-    limbs must not reach out of, as in `Pass`. `pull`, one or (F, D): weight of the squared distance
-    from `centre` (F, D; default: `poses`), as in `Refiner.gauss_newton`. `worth`: effective number of independent points per frame.
+    limbs must not reach out of, as in `Pass`. `pull`, one or (F, D): weight of the squared distance from `centre` (F, D; default: `poses`),
+    as in `Refiner.gauss_newton`. `worth`: effective number of independent points per frame.
     """
     settings, start, about = settings or SurfaceSettings(), poses if centre is None else centre, expected.to_array()
     pull = np.broadcast_to(pull, poses.shape)
@@ -69,8 +69,9 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
     tight = _precision(spread, shared)[np.ix_(free, free)]
     at, damping, best = ((about if first is None else first.to_array()), poses), 1e-2, None
     for turn in range(rounds + 1):
-        body, nudged = make(type(expected).from_array(at[0])), _nudged(make, type(expected), at[0], free)
-        model = _model(body)
+        body = make(type(expected).from_array(at[0]))
+        lengths = _lengths(body) if spaces else None
+        model, nudged = _model(body, lengths), _nudged(make, type(expected), at[0], free, lengths)
         frames = [_equations(model, nudged, pose, cloud, settings, space, emptiness)
                   for pose, cloud, space in zip(at[1], clouds, spaces or [None] * len(clouds), strict=True)]
         off = (at[0] - about)[free]
@@ -104,12 +105,19 @@ class _Model(NamedTuple):
     rotations: Array
     starts: Array
     parts: Single
-    spheres: Spheres
+    spheres: Spheres | None
+    """Those that must not reach out of silhouettes, if any are given."""
     reach: NDArray[np.bool_]
     """Whether a DOF moves a joint, of shape (D, J)."""
 
 
+def _lengths(body: Body) -> Array:
+    assert body.limbs is not None
+    return body.limbs.lengths
+
+
 def _model(body: Body, lengths: Array | None = None) -> _Model:
+    """Arrays of a body, with as many spheres as for limbs of these `lengths` (S,); None: without spheres, which take most of the time."""
     skeleton, limbs = body.skeleton, body.limbs
     assert limbs is not None
     parents = skeleton.tree[0]
@@ -119,7 +127,7 @@ def _model(body: Body, lengths: Array | None = None) -> _Model:
             above[:, j] |= above[:, parent]
     chain = make_chain(skeleton)
     return _Model(chain, limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts), part_constants(limbs),
-                  spheres_in(limbs, lengths), above[chain.owners])
+                  None if lengths is None else spheres_in(limbs, lengths), above[chain.owners])
 
 
 class _Frame(NamedTuple):
@@ -145,11 +153,10 @@ class _Solution(NamedTuple):
     body: Body
 
 
-def _nudged(make: Callable[[Measured], Body], kind: type[Measured], at: Array, free: NDArray[np.int64]) -> list[_Model]:
-    """Bodies, one per free size, in which that size is larger by `SIZE_STEP`."""
-    limbs = make(kind.from_array(at)).limbs
-    assert limbs is not None
-    return [_model(make(kind.from_array(at + SIZE_STEP * (np.arange(len(at)) == k))), limbs.lengths) for k in free]
+def _nudged(make: Callable[[Measured], Body], kind: type[Measured], at: Array, free: NDArray[np.int64],
+            lengths: Array | None = None) -> list[_Model]:
+    """Bodies, one per free size, in which that size is larger by `SIZE_STEP`; `lengths` as in `_model`."""
+    return [_model(make(kind.from_array(at + SIZE_STEP * (np.arange(len(at)) == k))), lengths) for k in free]
 
 
 def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float, start: Array, pull: Array,
@@ -197,6 +204,7 @@ def _within(frame: _Frame, model: _Model, nudged: list[_Model], pose: Array, scr
     out = _reaching(model, pose, space, emptiness, origin)
     used = np.flatnonzero(out[1] > 0)
     distances, weights = out[0, used], out[1, used]
+    assert model.spheres is not None
     joints = np.tile(model.spheres.joints, len(space.windows))[used]
     moves = (out[2:8, used].T @ screws.T) * model.reach[:, joints].T
     grows = [(distances - _reaching(other, pose, space, emptiness, origin)[0, used]) / SIZE_STEP for other in nudged]
@@ -208,6 +216,7 @@ def _within(frame: _Frame, model: _Model, nudged: list[_Model], pose: Array, scr
 
 def _reaching(model: _Model, pose: Array, space: FreeSpace, emptiness: float, origin: Array) -> Array:
     """What `rows_inside` says of a pose (D,), (9, C K)."""
+    assert model.spheres is not None
     T, number = np.zeros((len(model.chain.parents), 3, 4)), len(model.spheres.radii)
     place_one(pose, model.chain, T, np.zeros((len(pose), 6)), np.zeros((3, 3, 3)))
     out = np.zeros((9, len(space.windows) * number))

@@ -71,12 +71,11 @@ def estimate_height(rng: np.random.Generator, make: Callable[[float], Body], cam
         return float(seen.mean() * (1 + PENALTY * unusual)) if len(seen) else np.inf
 
     at = 0
-    while (better := min((at - 1, at + 1), key=cost)) is not None and cost(better) < cost(at):
+    while cost(better := min((at - 1, at + 1), key=cost)) < cost(at):
         at = better
     if not np.isfinite(cost(at)):
         return None
-    best = np.where(np.isfinite(tried[at]), tried[at], np.inf)
-    return SeenHeight(begin * RATIO ** (at + lowest_point(cost(at - 1), cost(at), cost(at + 1))), int(chosen[int(best.argmin())]))
+    return SeenHeight(begin * RATIO ** (at + lowest_point(cost(at - 1), cost(at), cost(at + 1))), int(chosen[int(tried[at].argmin())]))
 
 
 def _misfit(rng: np.random.Generator, tracker: MultiviewTracker, points: SurfacePoints, masks: Sequence[Mask | None]) -> float:
@@ -88,8 +87,7 @@ def _misfit(rng: np.random.Generator, tracker: MultiviewTracker, points: Surface
 
 
 def lowest_point(before: float, here: float, after: float) -> float:
-    """Place of the lowest point of a parabola through values at -1, 0 and 1, of which that at 0 is the least; 0 where they are not all
-    known."""
+    """Abscissa of the minimum of a parabola through values at -1, 0 and 1, where the value at 0 is the least; 0 if a value is infinite."""
     curve = before - 2 * here + after
     return 0.5 * (before - after) / curve if np.isfinite(curve) and curve > 0 else 0.0
 

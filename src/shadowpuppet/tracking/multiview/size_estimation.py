@@ -149,4 +149,3 @@ def _followed(rng: np.random.Generator, tracker: MultiviewTracker,
         if state.status in ("tracked", "uncertain"):
             found.append((n, state))
     return [(n, state) for n, state in found if state.overlap > best - OVERLAP_LOSS]
-

@@ -14,9 +14,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
-from shadowpuppet.tracking.multiview import body_postures, pose_search
-from shadowpuppet.tracking.multiview.arm_postures import JOINTS, usual_arm_postures
-from shadowpuppet.tracking.multiview.body_postures import usual_body_postures
+from shadowpuppet.tracking.multiview import arm_postures, body_postures, pose_search
 from shadowpuppet.tracking.multiview.local_search import LocalSearch
 from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, half_size
 from shadowpuppet.tracking.multiview.odd_camera import adapted, odd_one, suspects
@@ -199,11 +197,11 @@ class MultiviewTracker:
 
     def rarity_of_arms(self, poses: Array) -> Array:
         """How rare the postures of both arms are among people, together (N,), of poses (N, D)."""
-        return usual_arm_postures().rarity_of_both(self.body.points(poses, names=JOINTS))
+        return arm_postures.usual_arm_postures().rarity_of_both(self.body.points(poses, names=arm_postures.JOINTS))
 
     def rarity_of_limbs(self, poses: Array) -> Array:
         """How rare the whole postures of poses (N, D) are among people, (N,)."""
-        return usual_body_postures().rarity_of(self.body.points(poses, names=body_postures.JOINTS))
+        return body_postures.usual_body_postures().rarity_of(self.body.points(poses, names=body_postures.JOINTS))
 
     def refine(self, observation: MultiviewObservation, last: Array) -> Refine | None:
         """The function that refines poses (N, D); `last`: the last estimate (D,)."""

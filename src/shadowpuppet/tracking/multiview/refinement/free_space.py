@@ -62,7 +62,7 @@ class FreeSpace(NamedTuple):
 
 
 def spheres_in(limbs: Limbs, lengths: Array | None = None) -> Spheres:
-    """Spheres along each limb's axis, from its start to its end; as many as for limbs of these `lengths` (S,), if given."""
+    """Spheres along each limb's axis, from its start to its end. `lengths` (S,): lengths that set their number; None: the limbs'."""
     joints, places, radii, which = [], [], [], []
     for s, (length, own) in enumerate(zip(limbs.lengths, limbs.lengths if lengths is None else lengths, strict=True)):
         for share in np.linspace(0, 1, max(2, round(own / SPHERE_SPACING) + 1)):
@@ -177,12 +177,7 @@ def push_inside(T, spheres, space, distances, weight, origin, sums, adding):  # 
     for c in range(cameras):
         _sphere_distances(T, spheres, space, c, distances[c])
     for k in range(number):
-        inside = outside = 0
-        for c in range(cameras):
-            middle = distances[c, k, 0] - spheres.radii[k]
-            outside += middle > 0
-            inside += -np.inf < middle <= 0
-        outvoted = outside == 1 and inside >= OUTVOTING_CAMERAS
+        outvoted = _is_outvoted(distances, k, spheres.radii[k], OUTVOTING_CAMERAS)
         for c in range(cameras):
             own, V = distances[c, k], space.views[c]
             r = own[0]
@@ -193,9 +188,7 @@ def push_inside(T, spheres, space, distances, weight, origin, sums, adding):  # 
             if adding:
                 joint, place = T[spheres.joints[k]], spheres.places[k]
                 p0, p1, p2 = _placed(joint, place)
-                n0 = -(V[0, 0] * own[1] + V[1, 0] * own[2] + V[2, 0] * own[3])
-                n1 = -(V[0, 1] * own[1] + V[1, 1] * own[2] + V[2, 1] * own[3])
-                n2 = -(V[0, 2] * own[1] + V[1, 2] * own[2] + V[2, 2] * own[3])
+                n0, n1, n2 = _inward(own, V)
                 _add(n0, n1, n2, p0 - origin[0], p1 - origin[1], p2 - origin[2], share * fade, r, sums[spheres.joints[k]])
     return total
 
@@ -210,12 +203,7 @@ def rows_inside(T, spheres, space, distances, weight, origin, out):  # pragma: n
     for c in range(cameras):
         _sphere_distances(T, spheres, space, c, distances[c])
     for k in range(number):
-        inside = outside = 0
-        for c in range(cameras):
-            middle = distances[c, k, 0] - spheres.radii[k]
-            outside += middle > 0
-            inside += -np.inf < middle <= 0
-        outvoted = outside == 1 and inside >= TRUSTED_CAMERAS
+        outvoted = _is_outvoted(distances, k, spheres.radii[k], TRUSTED_CAMERAS)
         p0, p1, p2 = _placed(T[spheres.joints[k]], spheres.places[k])
         x0, x1, x2 = p0 - origin[0], p1 - origin[1], p2 - origin[2]
         for c in range(cameras):
@@ -225,13 +213,30 @@ def rows_inside(T, spheres, space, distances, weight, origin, out):  # pragma: n
             if r <= 0 or (outvoted and r > spheres.radii[k]):
                 continue
             bound, share = 1 / (1 + (r / TAU) ** 2), weight / (number * cameras)
-            n0 = -(V[0, 0] * own[1] + V[1, 0] * own[2] + V[2, 0] * own[3])
-            n1 = -(V[0, 1] * own[1] + V[1, 1] * own[2] + V[2, 1] * own[3])
-            n2 = -(V[0, 2] * own[1] + V[1, 2] * own[2] + V[2, 2] * own[3])
+            n0, n1, n2 = _inward(own, V)
             out[1, at] = share * bound**2
             out[2, at], out[3, at], out[4, at] = x1 * n2 - x2 * n1, x2 * n0 - x0 * n2, x0 * n1 - x1 * n0
             out[5, at], out[6, at], out[7, at] = n0, n1, n2
             out[8, at] = share * bound * r * r
+
+
+@device
+def _is_outvoted(distances, k, radius, cameras):  # pragma: no cover
+    """Whether the centre of sphere `k` is outside one silhouette only and inside at least `cameras`, by distances (C, K, 4)."""
+    inside = outside = 0
+    for c in range(distances.shape[0]):
+        middle = distances[c, k, 0] - radius
+        outside += middle > 0
+        inside += -np.inf < middle <= 0
+    return outside == 1 and inside >= cameras
+
+
+@device
+def _inward(own, V):  # pragma: no cover
+    """Direction (3), world, into a silhouette from what `_sphere_distances` says of a sphere, (4,), and the camera's transform."""
+    return (-(V[0, 0] * own[1] + V[1, 0] * own[2] + V[2, 0] * own[3]),
+            -(V[0, 1] * own[1] + V[1, 1] * own[2] + V[2, 1] * own[3]),
+            -(V[0, 2] * own[1] + V[1, 2] * own[2] + V[2, 2] * own[3]))
 
 
 @device
