@@ -89,15 +89,15 @@ class MadeOnDemand(Sequence[T], Generic[T]):
         if isinstance(n, slice):
             return self.several(range(self._count)[n])
         n = range(self._count)[n]
-        if n not in self._items and self._make is not None:
-            self._items[n] = self._make(n)
+        if n not in self._items and (make := self._make) is not None:
+            self._items[n] = make(n)
+            if len(self._items) == self._count:
+                self._make = None  # and with it what they are made from
         return self._items[n]
 
     def __iter__(self) -> Iterator[T]:
         """All items, in order."""
-        found = self.several(range(self._count))
-        self._make = None  # and with it what they are made from
-        return iter(found)
+        return iter(self.several(range(self._count)))
 
     def several(self, which: Iterable[int]) -> list[T]:
         """The items of some numbers, made on several cores."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,6 +13,15 @@ Mask = NDArray[np.bool_]
 """A silhouette, of shape (H, W)."""
 NEARLY_ALL = 0.8
 """Share of the picture above which a silhouette is implausible."""
+
+
+class Seen(NamedTuple):
+    """What the cameras show of a frame set."""
+
+    masks: tuple[Mask | None, ...]
+    """Silhouettes (H, W), by camera."""
+    shadows: tuple[Mask | None, ...] = ()
+    """Pixels (H / 2, W / 2), by camera, that were taken for shadow; empty: not known."""
 
 
 def check_mask(mask: ArrayLike, size: tuple[int, int], what: str = "mask") -> Mask:

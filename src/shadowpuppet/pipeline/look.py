@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from shadowpuppet.calibration.agreement import Agreement
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.errors import Caution
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
@@ -135,6 +135,12 @@ class FirstSeconds(NamedTuple):
     for: a look needs a few of them only."""
     spread: tuple[tuple[Mask | None, ...], ...] = ()
     """With one camera: masks of moments spread over the whole film, as `masks`."""
+    shadows: Sequence[tuple[Mask | None, ...]] = ()
+    """With several: what was taken for shadow, as in `Seen`, for each time."""
+
+    def seen(self, n: int) -> Seen:
+        """What the cameras show at time `n`."""
+        return Seen(self.masks[n], self.shadows[n] if len(self.shadows) else ())
 
 
 @dataclass(frozen=True, eq=False)

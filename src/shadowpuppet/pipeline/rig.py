@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.errors import SettingsError, SilhouetteError, VideoError, warn
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage, chosen_views, open_recording
@@ -42,6 +42,11 @@ def unshared(found: Sequence[Segmented | None]) -> tuple[Mask | None, ...]:
     return tuple(None if each is None else each.mask for each in found)
 
 
+def shown_in(found: Sequence[Segmented | None], share: Share = unshared) -> Seen:
+    """What the silhouettes of a set's cameras show, with those masks that `share` makes of them."""
+    return Seen(share(found), tuple(None if each is None or each.shadow is None else each.shadow[::2, ::2].copy() for each in found))
+
+
 class FrameSet(NamedTuple):
     """Frames of all cameras at one time, in the rig's order; None for a camera without a frame."""
 
@@ -58,6 +63,8 @@ class FrameSet(NamedTuple):
     """Silhouettes (H, W) as each camera's own picture has them; empty where other cameras have added nothing to `masks`."""
     corrected: tuple[Image | None, ...] = ()
     """Images that fit the masks, in the light of the empty scene (`Segmented.image`); empty: not known."""
+    shadows: tuple[Mask | None, ...] = ()
+    """As in `Seen`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,12 +186,12 @@ def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = F
                 continue
             start = time.perf_counter()
             found = [part.segmented for part in parts]
-            own, masks = unshared(found), share(found)
+            own, (masks, shadows) = unshared(found), shown_in(found, share)
             sharing = time.perf_counter() - start
             yield FrameSet(moment, tuple(part.image for part in parts), masks,
                            sum(part.decoding for part in parts), sum(part.segmenting for part in parts) + sharing,
                            () if all(map(operator.is_, own, masks)) else own,
-                           tuple(None if each is None else each.image for each in found))
+                           tuple(None if each is None else each.image for each in found), shadows)
 
 
 class _Part(NamedTuple):

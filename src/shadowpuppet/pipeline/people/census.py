@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample
-from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.pipeline.rig import Rig, Share, shown_in, unshared
 from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.people.figures import Figure, find_floor, find_people, telling
@@ -43,59 +44,58 @@ class Census:
     numbers: tuple[int, ...]
     """People seen in each of the frame sets."""
 
-    def people(self, masks: Sequence[Mask | None]) -> list[Figure]:
-        """The people in one frame's masks (H, W), one per camera."""
-        return find_people(self.floor, masks)
+    def people(self, seen: Seen) -> list[Figure]:
+        """The people in one frame set."""
+        return find_people(self.floor, seen.masks, shadows=seen.shadows)
 
 
-def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes]) -> list[tuple[Mask | None, ...]]:
-    """Masks (H, W) by camera of frames that were sampled from all films at the same times, `SETS` at most."""
+def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes], share: Share = unshared) -> list[Seen]:
+    """What is seen in frames that were sampled from all films at the same times, `SETS` at most; `share` as for `synchronized_frames`."""
     if not samples or not samples[0].frames:
         return []
     leader = samples[0]
     reach = 0.5 * leader.pace if np.isfinite(leader.pace) else 0.0
     chosen = [leader.frames[n] for n in evenly_spread(len(leader.frames), SETS)]
 
-    def masks(sample: Sample, each: Silhouettes) -> list[Mask | None]:
-        return [None if (near := _nearest(sample, frame.time, reach)) is None else each(near) for frame in chosen]
+    def segmented(sample: Sample, each: Silhouettes) -> list[Segmented | None]:
+        return [None if (near := _nearest(sample, frame.time, reach)) is None else each.segmented(near) for frame in chosen]
 
     with ThreadPoolExecutor(usable_cores(), "census") as pool:
-        return list(zip(*pool.map(masks, samples, silhouettes), strict=True))
+        return [shown_in(found, share) for found in zip(*pool.map(segmented, samples, silhouettes), strict=True)]
 
 
-def later_sets(rig: Rig, silhouettes: Sequence[Silhouettes], after: float) -> list[tuple[Mask | None, ...]]:
-    """Masks (H, W) by camera at `SETS` moments at most, spread over the rest of the films `after` a time (s): of people who come later.
-    Found by seeking; none of ready silhouettes, and of films that do not state their length."""
+def later_sets(rig: Rig, silhouettes: Sequence[Silhouettes], after: float, share: Share = unshared) -> list[Seen]:
+    """What is seen at `SETS` moments at most, spread over the rest of the films `after` a time (s): of people who come later. Found by
+    seeking; none of ready silhouettes, and of films that do not state their length."""
     ends = [footage.count / footage.film.rate for footage in rig.footage if footage.count and np.isfinite(footage.film.rate)]
     begin = rig.recording.begin
     if len(ends) < len(rig.footage) or any(each.segmenter is None for each in silhouettes) or begin + min(ends) < after + LATER:
         return []
     times = np.linspace(after + LATER / 2, begin + min(ends) - LATER / 2, SETS)
     with ThreadPoolExecutor(usable_cores(), "census") as pool:
-        masks = list(pool.map(lambda footage, each: list(_at(footage, each, times)), rig.footage, silhouettes))
-    return list(zip(*masks, strict=True))
+        every = list(pool.map(lambda footage, each: list(_at(footage, each, times)), rig.footage, silhouettes))
+    return [shown_in(found, share) for found in zip(*every, strict=True)]
 
 
-def _at(footage: Footage, silhouettes: Silhouettes, times: Array) -> Iterator[Mask | None]:
+def _at(footage: Footage, silhouettes: Silhouettes, times: Array) -> Iterator[Segmented | None]:
     with Seeker(Path(str(footage.view.video)), footage.camera.size, footage.recording.rate) as seeker:
         for time in times:
             image = seeker.at(footage.view.start + float(time))
-            yield None if image is None else silhouettes(CameraFrame(float(time), image, None))
+            yield None if image is None else silhouettes.segmented(CameraFrame(float(time), image, None))
 
 
-def take_census(cameras: Sequence[Camera], sets: Sequence[Sequence[Mask | None]],
-                later: Sequence[Sequence[Mask | None]] = ()) -> Census | None:
-    """The people in frame sets of masks (H, W), one per camera, of the film's beginning and of what comes `later`; None if nothing is seen
-    by two cameras."""
-    hull, begun, sets = VisualHull(cameras), len(sets), [telling(masks) for masks in (*sets, *later)]
+def take_census(cameras: Sequence[Camera], sets: Sequence[Seen], later: Sequence[Seen] = ()) -> Census | None:
+    """The people in frame sets of the film's beginning and of what comes `later`; None if nothing is seen by two cameras."""
+    hull, begun = VisualHull(cameras), len(sets)
+    sets = [seen._replace(masks=tuple(telling(seen.masks))) for seen in (*sets, *later)]
     with ThreadPoolExecutor(usable_cores(), "census") as pool:
-        points = [surface.points for surface in pool.map(hull.points, sets)]
+        points = [surface.points for surface in pool.map(lambda seen: hull.points(seen.masks), sets)]
         everywhere = np.concatenate(points) if points else np.zeros((0, 3))
         if len(everywhere) < FEW_POINTS:
             return None
-        floor = find_floor(cameras, everywhere, [sets[n] for n in evenly_spread(len(sets), FLOOR_SETS)])
-        seen = list(pool.map(lambda masks: find_people(floor, masks), sets))
-    numbers, certain = tuple(map(sure_number, seen)), [certain_number(figures) for figures in seen]
+        floor = find_floor(cameras, everywhere, [sets[n].masks for n in evenly_spread(len(sets), FLOOR_SETS)])
+        every = list(pool.map(lambda seen: find_people(floor, seen.masks, shadows=seen.shadows), sets))
+    numbers, certain = tuple(map(sure_number, every)), [certain_number(figures) for figures in every]
     return Census(max(counted(numbers[:begun]), counted(numbers[begun:]), counted(certain, share=0.0)), floor, numbers)
 
 

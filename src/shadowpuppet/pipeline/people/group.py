@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.pipeline.people.fronts import face_the_way
@@ -69,9 +69,9 @@ class Group:
         self.members.append(Member(len(self.members) + 1, subject, self.rng.spawn(1)[0], None, height, place))
         return self.members[-1]
 
-    def start(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None]) -> None:
+    def start(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None], shadows: Sequence[Mask | None] = ()) -> None:
         """Start the measured people, each at the nearest figure of the first frame set; arguments as for `next`."""
-        figures = find_people(self.floor, masks)
+        figures = find_people(self.floor, masks, shadows=shadows)
         pairs = sorted((float(np.linalg.norm(figure.place - member.place)), member.number, n)
                        for member in self.members for n, figure in enumerate(figures))  # fmt: skip
         of = dict[int, Figure]()
@@ -94,8 +94,10 @@ class Group:
         """Whether all people are tracked and no other seems to come: else what bodies leave unexplained says nothing about cameras."""
         return not self.coming and all(member.state is not None and member.state.status == "tracked" for member in self.present)
 
-    def next(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None], images: Images = ()) -> None:
-        """Update all people by a frame's surface points and masks (H, W), and the images that fit these, one per camera."""
+    def next(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None], images: Images = (),
+             shadows: Sequence[Mask | None] = ()) -> None:
+        """Update all people by a frame's surface points and masks (H, W), the images that fit these, and what was taken for shadow
+        (H / 2, W / 2), one per camera."""
         people = {member.number: Person(member.subject.tracker, member.rng, member.state)
                   for member in self.present if member.state is not None}  # fmt: skip
         for number, share in step(people, points, masks).items():
@@ -107,15 +109,16 @@ class Group:
             list(pool.map(lambda number: face_the_way(self.members[number - 1], time), people))  # raises what one of them raised
         if time >= self.due:
             self.due = time + LOOK_SECONDS
-            self._look(time, points, masks, images)
+            self._look(time, points, masks, images, shadows)
         for member in self.present:
             if member.lost_since is not None and time - member.lost_since >= GONE_SECONDS:
                 member.state = member.share = member.lost_since = member.before = None
 
-    def _look(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None], images: Images) -> None:
+    def _look(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None], images: Images,
+              shadows: Sequence[Mask | None]) -> None:
         """See who is who, and find new, returning and lost people among the figures that no tracked body explains."""
         drawn = {member.number: member.share.drawn for member in self.present if member.share is not None and member.lost_since is None}
-        figures = find_people(self.floor, masks, explained(drawn, len(masks)))
+        figures = find_people(self.floor, masks, explained(drawn, len(masks)), shadows)
         places = [place_of(member.subject.body, member.state) for member in self.present
                   if member.state is not None and member.lost_since is None]  # fmt: skip
         free = [figure for figure in figures if all(np.linalg.norm(place - figure.place) > SAME_PLACE for place in places)]
@@ -237,12 +240,12 @@ def seen_in(found: Followed, looks: Mapping[int, Look]) -> list[Sighting]:
             for n, figure in zip(found.sets, found.figures)]  # fmt: skip
 
 
-def first_people(floor: Floor, times: Sequence[float], sets: Sequence[Sequence[Mask | None]]) -> tuple[list[Followed], list[list[Figure]]]:
-    """The people in the first seconds' masks (H, W), by time and camera: those seen in half of the sets or more, the longest seen first;
-    and all figures of each set."""
+def first_people(floor: Floor, times: Sequence[float], sets: Sequence[Seen]) -> tuple[list[Followed], list[list[Figure]]]:
+    """The people in the frame sets of the first seconds: those seen in half of the sets or more, the longest seen first; and all figures of
+    each set."""
     people, every = list[Followed](), list[list[Figure]]()
-    for n, (time, masks) in enumerate(zip(times, sets, strict=True)):
-        every.append(find_people(floor, masks))
+    for n, (time, seen) in enumerate(zip(times, sets, strict=True)):
+        every.append(find_people(floor, seen.masks, shadows=seen.shadows))
         people = follow(people, n, time, every[-1])
     lasting = [each for each in people if 2 * len(each.sets) >= len(sets)]
     return sorted(lasting, key=lambda each: (-len(each.sets), float(each.figures[0].place[0]))), every

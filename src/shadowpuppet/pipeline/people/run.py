@@ -174,7 +174,7 @@ class PeopleRun:
         if carried is not None:
             restore(group, carried.group, lambda held: remade(for_fit, self.rig.cameras, self.options, rate, held))
             return group
-        people, every = first_people(floor, first.times, first.masks)
+        people, every = first_people(floor, first.times, [first.seen(n) for n in range(len(first.times))])
         seen = {n: Look(figures, masks, ()) for n, (figures, masks) in enumerate(zip(every, first.masks))}
         for found in people:
             try:
@@ -219,8 +219,8 @@ class PeopleRun:
                 with timer.time("track"):
                     if not begun and len(points.points):
                         begun = True
-                        group.start(seen.time, points, masks)
-                    group.next(seen.time, points, masks, seen.corrected if options.appearance else ())
+                        group.start(seen.time, points, masks, seen.shadows)
+                    group.next(seen.time, points, masks, seen.corrected if options.appearance else (), seen.shadows)
                 with timer.time("write"):
                     found = self._write(group, seen, stack, places)
                     clear.append(group.is_clear)

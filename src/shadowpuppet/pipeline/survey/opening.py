@@ -8,11 +8,11 @@ from itertools import islice
 
 import numpy as np
 
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.pipeline.footage import CameraFrame, Opening, Sample
 from shadowpuppet.pipeline.look import FirstSeconds
-from shadowpuppet.pipeline.rig import Rig, synchronized_frames
+from shadowpuppet.pipeline.rig import Rig, shown_in, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.threads import MadeOnDemand, usable_cores
 from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
@@ -51,12 +51,14 @@ def kept_sets(rig: Rig, samples: Sequence[Sample], opening: Opening) -> list[tup
 
 
 def _segmented(rig: Rig, silhouettes: Sequence[Silhouettes], sets: Sequence[tuple[CameraFrame, ...]]) -> FirstSeconds:
-    share = SharedShadows(rig.cameras)
+    share, number = SharedShadows(rig.cameras), len(sets)
 
-    def masks(n: int) -> tuple[Mask | None, ...]:
-        return share([each.segmented(frame) for each, frame in zip(silhouettes, sets[n], strict=True)])
+    def seen(n: int) -> Seen:
+        return shown_in([each.segmented(frame) for each, frame in zip(silhouettes, sets[n], strict=True)], share)
 
-    return FirstSeconds([frames[rig.leaders[0]].time for frames in sets], MadeOnDemand(masks, len(sets)))
+    found = MadeOnDemand(seen, number)
+    return FirstSeconds([frames[rig.leaders[0]].time for frames in sets], MadeOnDemand(lambda n: found[n].masks, number),
+                        shadows=MadeOnDemand(lambda n: found[n].shadows, number))
 
 
 def _read_sets(rig: Rig, silhouettes: Sequence[Silhouettes], opening: Opening, ready: bool) -> FirstSeconds:
@@ -64,6 +66,6 @@ def _read_sets(rig: Rig, silhouettes: Sequence[Silhouettes], opening: Opening, r
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when the run comes to it
         frames = synchronized_frames(rig, [each.segmented for each in silhouettes], ready=ready, every=opening.every,
                                      threads=usable_cores(), share=SharedShadows(rig.cameras))
-        sets = [(each.time, each.masks) for each in islice(frames, opening.number)]
+        sets = [(each.time, each.masks, each.shadows) for each in islice(frames, opening.number)]
     sets = [each for each in sets if each[0] <= rig.recording.begin + opening.seconds] or sets[:1]
-    return FirstSeconds([time for time, _ in sets], [masks for _, masks in sets])
+    return FirstSeconds([time for time, _, _ in sets], [masks for _, masks, _ in sets], shadows=[shadows for _, _, shadows in sets])

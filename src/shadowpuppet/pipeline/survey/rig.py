@@ -23,6 +23,7 @@ from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, of_sever
 from shadowpuppet.pipeline.survey.opening import OPENING, first_seconds, opening_of
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_opencv_thread, usable_cores
+from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 from shadowpuppet.tracking.people.views import View, views_of
 
 SILHOUETTES_OR_CAMERAS = "silhouettes do not fit together: film the empty scene, or calibrate"
@@ -49,7 +50,9 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     if any(_shows_person(film) for film in films):
         steps("counting people in all films")
         seen = max((film.sample.times[-1] for film in films if len(film.sample.times)), default=0.0)
-        census = take_census(rig.cameras, sampled_sets([film.sample for film in films], wide), later_sets(rig, wide, float(seen)))
+        share = SharedShadows(rig.cameras)
+        census = take_census(rig.cameras, sampled_sets([film.sample for film in films], wide, share),
+                             later_sets(rig, wide, float(seen), share))
     several = census.number if census is not None and census.number > 1 else 0
     if several:
         films = [of_several(film) for film in films]
@@ -81,9 +84,8 @@ def _agreement_of_people(rig: Rig, census: Census, first: FirstSeconds) -> Agree
     people than another, so that whole silhouettes are compared only for a camera without such a view."""
     rows = list[View]()
     for n in evenly_spread(len(first.masks), SETS_COMPARED):
-        masks = first.masks[n]
-        figures = census.people(masks)
-        each = (views_of(census.floor, one, [other for other in figures if other is not one], masks) for one in figures)
+        figures = census.people(first.seen(n))
+        each = (views_of(census.floor, one, [other for other in figures if other is not one], first.masks[n]) for one in figures)
         rows += [row for row in each if sum(mask is not None for mask in row) > 1]
     if 2 * len(rows) < SETS_COMPARED:  # one person in a calibration of the wrong unit may be taken for several
         return _agreement_of_one(rig, first)

@@ -34,8 +34,9 @@ USUAL, UNUSUAL = 1.7, 0.3
 WIDE, HEAD = 0.22, 0.11
 """Half the width of what a figure explains, at trunk and legs and at the head, metres."""
 ROWS = np.array([len(TRUNK), len(LEGS), len(ASIDE)])
-NONE, NEW, KNOWN = 0, 1, 2
-"""What a pixel is: no silhouette, silhouette that no body explains, silhouette that may be another's."""
+NONE, NEW, KNOWN, SHADE = 0, 1, 2, 3
+"""What a pixel is: no silhouette, silhouette that no body explains, silhouette that may be another's, and what was taken for shadow, which
+may be a dark limb."""
 
 
 TRIED_REACH, TRIED_NEAR = 0.3, 0.5
@@ -57,10 +58,14 @@ class Figure(NamedTuple):
     """In views, see `NEEDED`."""
 
 
-def find_people(floor: Floor, masks: Sequence[Mask | None], explained: Sequence[Mask | None] = ()) -> list[Figure]:
-    """The people in one frame's masks (H, W), one per camera, the most certain first. `explained`: pixels (H / 2, W / 2), by camera, that
-    people who are known already explain: silhouette there is no evidence, neither for others nor against them."""
-    state, used = _states(masks, explained)
+def find_people(floor: Floor, masks: Sequence[Mask | None], explained: Sequence[Mask | None] = (),
+                shadows: Sequence[Mask | None] = ()) -> list[Figure]:
+    """The people in one frame's masks (H, W), one per camera, the most certain first.
+
+    Two kinds of pixels (H / 2, W / 2), by camera, are no evidence, neither for people nor against them: silhouette that people who are
+    known already explain, `explained`, and what was taken for shadow and may be dark legs, `shadows`.
+    """
+    state, used = _states(masks, explained, shadows)
     scores = np.full((len(floor.places), len(HEIGHTS)), -np.inf)
     unusual = UNUSUAL * np.abs(np.array(HEIGHTS) - USUAL)
     left, found = np.arange(len(scores)), list[Figure]()
@@ -78,14 +83,15 @@ def find_people(floor: Floor, masks: Sequence[Mask | None], explained: Sequence[
             flat = state[n, : mask.size]
             flat[mask.ravel() & (flat == NEW)] = KNOWN
         left = left[np.linalg.norm(floor.places[left] - place, axis=1) >= APART]
-    return _without_ghosts(floor, masks, explained, found)
+    return _without_ghosts(floor, (masks, explained, shadows), found)
 
 
-def _without_ghosts(floor: Floor, masks: Sequence[Mask | None], explained: Sequence[Mask | None], found: list[Figure]) -> list[Figure]:
-    """The figures that explain something which all of the others, also those found later, leave; the least certain go first."""
+def _without_ghosts(floor: Floor, seen: tuple[Sequence[Mask | None], ...], found: list[Figure]) -> list[Figure]:
+    """The figures that explain something which all of the others, also those found later, leave; the least certain go first. `seen`: as for
+    `_states`."""
     kept = list(found)
     for figure in reversed(found) if len(found) > 2 else ():
-        state, used = _states(masks, explained)
+        state, used = _states(*seen)
         for other in kept:
             for n, mask in enumerate(drawn(floor, other) if other is not figure else ()):
                 flat = state[n, : mask.size]
@@ -156,16 +162,19 @@ def drawn(floor: Floor, figure: Figure, wide: float = WIDE) -> list[Mask]:
     return found
 
 
-def _states(masks: Sequence[Mask | None], explained: Sequence[Mask | None]) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
-    """What each pixel is, (C, pixels), and the cameras that say something."""
+def _states(masks: Sequence[Mask | None], explained: Sequence[Mask | None] = (),
+            shadows: Sequence[Mask | None] = ()) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+    """What each pixel is, (C, pixels), and the cameras that say something; arguments as for `find_people`."""
     halves = [None if mask is None else solid(mask[::2, ::2]) for mask in telling(masks)]
     state = np.zeros((len(halves), max((half.size for half in halves if half is not None), default=0)), np.uint8)
     for n, half in enumerate(halves):
         if half is not None:
             state[n, : half.size] = half.ravel()
-            known = explained[n] if n < len(explained) else None
+            own, known, shade = state[n, : half.size], *(each[n] if n < len(each) else None for each in (explained, shadows))
             if known is not None:
-                state[n, : half.size][(half & known).ravel()] = KNOWN
+                own[(half & known).ravel()] = KNOWN
+            if shade is not None:
+                own[(shade & ~half).ravel()] = SHADE
     return state, np.array([n for n, half in enumerate(halves) if half is not None], np.int64)
 
 
@@ -183,7 +192,7 @@ def _height(floor: Floor, place: Array, about: float, state: NDArray[np.uint8]) 
     for n, camera in enumerate(floor.cameras):
         at = pixel_index(camera, figure_points(camera, place[None], floor.level + z.repeat(3), np.tile(across, len(z)))[0])
         rows = np.where(at >= 0, state[n, np.maximum(at, 0) % max(state.shape[1], 1)], KNOWN).reshape(-1, 3)
-        seen = np.where((rows == KNOWN).any(1), KNOWN, rows.max(1))
+        seen = np.where((rows == KNOWN).any(1), KNOWN, np.where((rows == NEW).any(1), NEW, NONE))
         end = int(np.argmax(seen != NEW))
         if seen[end] == NONE and end and z[end] > about - 0.3:
             tops.append(float(z[end]))
@@ -219,7 +228,7 @@ def _score(pixels, which, state, used, rows, empty, least, scores):  # pragma: n
                         if at >= 0:
                             seen += 1
                             new += state[c, at] == 1
-                            known += state[c, at] == 2
+                            known += state[c, at] >= 2
                     if new:
                         value += 1.0
                     elif seen == aside and not known:

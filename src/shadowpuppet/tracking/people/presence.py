@@ -22,7 +22,10 @@ MIN_COUNTED = 2
 """Least number of these sets."""
 
 SURE, CERTAIN = 1.0, 1.5
-"""Evidence, in views, from which on a figure is a person beside two others; from which on it is a second person who is seldom seen."""
+"""Evidence, in views, from which on a figure is a person beside two others; from which on it is a second person who is seldom seen, or who
+stands close to another."""
+CLOSE = 0.7
+"""Distance (m) of two figures up to which one may be a part of the other's person: the legs of one who sits or lies."""
 
 
 @dataclass
@@ -53,9 +56,12 @@ class Followed:
 
 
 def sure_number(figures: Sequence[Figure]) -> int:
-    """Number of people in a frame set's figures: without those beyond the second that have less than a whole view of evidence, as what
-    bodies leave over where they reach beyond their figures may look like a person."""
-    return max(sum(figure.evidence >= SURE for figure in figures), min(len(figures), 2))
+    """Number of people in a frame set's figures, the most certain first: without those beyond the second that have less than a whole view of
+    evidence, as what bodies leave over where they reach beyond their figures may look like a person, and without uncertain ones close to
+    another."""
+    apart = [figure for n, figure in enumerate(figures)
+             if figure.evidence >= CERTAIN or all(np.linalg.norm(figure.place - other.place) >= CLOSE for other in figures[:n])]  # fmt: skip
+    return max(sum(figure.evidence >= SURE for figure in apart), min(len(apart), 2))
 
 
 def certain_number(figures: Sequence[Figure]) -> int:

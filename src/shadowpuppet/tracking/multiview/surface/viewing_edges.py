@@ -106,14 +106,15 @@ def spaced_vertices(lines, outward, step):  # pragma: no cover
 
 
 def cut_rays(camera: Indices, rays: Array, relative: Array, lines: Array, spans: Indices, circles: Array, bounds: Indices, lenses: Array,
-        tolerated: int) -> tuple[Indices, Array]:
+        tolerated: int = 0, longest: float = np.inf) -> tuple[Indices, Array]:
     """Viewing edges of rays (R, 3), z = 1, from views `camera` (R,): the index (E,) of each edge's ray, and its depths (E, 2).
 
     Args:
         relative: transforms (V, V, 4, 4) from view to view.
         lines: vertices (2, N) of all polygons.
         spans, circles: runs (C, 2) and their circles (3, C); view j's are those from `bounds[j]` to `bounds[j + 1]`.
-        tolerated: number of views that may deny a place, on rays that have no viewing edge otherwise.
+        tolerated: number of views that may deny a place, on rays that have no viewing edge of at most `longest` (m) otherwise. Longer
+            ones lie where few pictures reach, beyond the person, and nearly every ray has some.
     """
     apart = np.linalg.norm(relative[:, :, :3, 3], axis=2) > MIN_BASELINE  # no view carves its own rays
     most = lines.shape[1] + 2  # each side is crossed at most once
@@ -122,21 +123,23 @@ def cut_rays(camera: Indices, rays: Array, relative: Array, lines: Array, spans:
     room = 2 * len(rays) + most
     while True:
         ray, depths = np.empty(room, np.int64), np.empty((room, 2))
-        count, done = _cut(camera, rays, relative, apart, polygons, lenses, tolerated, scratch, ray, depths)
+        count, done = _cut(camera, rays, relative, apart, polygons, lenses, tolerated, longest, scratch, ray, depths)
         if done:
             return ray[:count], depths[:count]
         room *= 4
 
 
 @kernel
-def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, scratch, ray, depths):  # pragma: no cover
+def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, longest, scratch, ray, depths):  # pragma: no cover
     """Fill `ray` and `depths`; returns the number of edges, and whether the arrays had room for all."""
     count, pieces = 0, scratch[-1]
     for r in range(rays.shape[0]):
-        i, u, v, level, before = camera[r], rays[r, 0], rays[r, 1], 0, count
+        i, u, v, level, before, short = camera[r], rays[r, 0], rays[r, 1], 0, count, False
+        most = longest / np.sqrt(u * u + v * v + 1)
         if count + pieces.shape[1] > ray.size:
             return count, False
-        while level <= tolerated and count == before:
+        while level <= tolerated and not short:
+            count = before  # the next level has the same edges, and longer ones
             at, n = _leave(relative, i, apart, u, v, polygons, level, scratch)
             k, needed = 0, max(1, (1 + CONFIRMING_VIEWS) * level)
             while k < n:
@@ -145,6 +148,7 @@ def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, scratch, ra
                 if found and _witnessed(relative, i, apart, u, v, (lo + hi) / 2, lenses, needed):
                     ray[count], depths[count, 0], depths[count, 1] = r, lo, hi
                     count += 1
+                    short |= hi - lo <= most
             level += 1
     return count, True
 

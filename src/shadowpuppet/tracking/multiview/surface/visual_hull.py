@@ -127,7 +127,7 @@ class VisualHull:
         for n in people:
             rays[camera == n] = self.cameras[n].rays(pixels[camera == n])
         carving = self._carving([_silhouette(mask, self._views[n]) for n, mask in people.items()], which)
-        ray, depths = cut_rays(np.searchsorted(which, camera), rays, *carving, 0)
+        ray, depths = cut_rays(np.searchsorted(which, camera), rays, *carving)
         back = inverse(self._T)[camera[ray]]
         return ray, np.einsum("eij,ekj->eki", back[:, :3, :3], rays[ray, None] * depths[..., None]) + back[:, None, :3, 3]
 
@@ -139,7 +139,7 @@ class VisualHull:
         rays = np.concatenate([s.lines[t] for s, t in zip(silhouettes, taken)])
         rays = np.concatenate([rays, np.ones((len(rays), 1))], 1)
         outward = np.concatenate([s.outward[t] for s, t in zip(silhouettes, taken)])
-        ray, depths = cut_rays(camera, rays, *self._carving(silhouettes, which), self.settings.tolerated)
+        ray, depths = cut_rays(camera, rays, *self._carving(silhouettes, which), self.settings.tolerated, self.settings.longest)
         return which[camera[ray]], rays[ray], outward[ray], depths
 
     def _carving(self, silhouettes: list[_Silhouette], which: NDArray[np.int64]) -> _Carving:
