@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from shadowpuppet.silhouette.boundary import OUTWARD_REACH, Contrast, EdgeProfile, Labels, Window, at_half_contrast, disc
 
 MIN_PART_SHARE = 0.02
-"""Least size of another part of the person (a hand), over the largest part's."""
-MIN_PERSON_SHARE = 0.06
-"""Least size of another person over the largest part's: one four times as far away."""
+"""Least size of another part of the person (a hand), or of another person, over the largest part's: a person five times as far away as two
+who are seen as one part."""
 MAX_PART_GAP = 0.06
 """Greatest distance of such a part (half a neck), over the square root of the largest part's area."""
 MAX_HOLE_SHARE = 0.004
@@ -31,7 +30,7 @@ def clean(label: Labels, contrast: Callable[[Window], Contrast], outline: EdgePr
 
 
 def coarse_person(label: Labels, several: bool = False) -> Labels:
-    """The connected part, without specks, with the most pixels labelled 2; with `several` also other parts of a person's size."""
+    """The connected part, without specks, with the most pixels labelled 2; with `several` all but small ones."""
     import cv2
 
     likely = cv2.medianBlur((label > 0).astype(np.uint8), 3)
@@ -44,7 +43,7 @@ def coarse_person(label: Labels, several: bool = False) -> Labels:
 
 def main_part(mask: Labels, sure: NDArray[np.bool_], several: bool = False) -> Labels:
     """The connected part with the most `sure` pixels, and parts that nearly touch it, such as a head if the neck is lost; with `several`
-    also other parts of a person's size, and what nearly touches them.
+    all parts but small ones.
 
     Empty if no pixel is sure.
     """
@@ -58,12 +57,14 @@ def main_part(mask: Labels, sure: NDArray[np.bool_], several: bool = False) -> L
     if number == 2:
         return mask.copy()
     counts[0] = 0
-    least = MIN_PERSON_SHARE * counts.max() if several else counts.max()
-    kept = np.isin(parts, np.flatnonzero(counts >= least)).astype(np.uint8) if several else (parts == counts.argmax()).astype(np.uint8)
-    others = np.flatnonzero((counts >= MIN_PART_SHARE * counts.max()) & (counts < least))
-    if len(others):
+    large = counts >= MIN_PART_SHARE * counts.max()
+    if several:
+        return np.isin(parts, np.flatnonzero(large)).astype(np.uint8)
+    kept = (parts == counts.argmax()).astype(np.uint8)
+    large[counts.argmax()] = False
+    if large.any():
         near = cv2.dilate(kept, disc(max(1, round(MAX_PART_GAP * counts.max() ** 0.5))))
-        touching = np.intersect1d(others, parts[near > 0])
+        touching = np.intersect1d(np.flatnonzero(large), parts[near > 0])
         kept |= np.isin(parts, touching)
     return kept
 

@@ -24,7 +24,8 @@ def floor_height(heights: Array, speeds: Array) -> float:
     slow = heights[(speeds < SLOW) & np.isfinite(heights)]
     if len(slow) < FEWEST:
         return np.nan
-    return float(np.median(slow[np.abs(slow - np.percentile(slow, LOWEST)) < BAND]))
+    lowest = slow[np.abs(slow - np.percentile(slow, LOWEST)).argmin()]
+    return float(np.median(slow[np.abs(slow - lowest) < BAND]))
 
 
 def under_feet(names: Sequence[str], positions: Array, legs: float) -> float:

@@ -69,9 +69,9 @@ class Group:
         self.members.append(Member(len(self.members) + 1, subject, self.rng.spawn(1)[0], None, height, place))
         return self.members[-1]
 
-    def start(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None], shadows: Sequence[Mask | None] = ()) -> None:
+    def start(self, time: float, points: SurfacePoints, seen: Seen) -> None:
         """Start the measured people, each at the nearest figure of the first frame set; arguments as for `next`."""
-        figures = find_people(self.floor, masks, shadows=shadows)
+        figures = find_people(self.floor, seen.masks, shadows=seen.shadows)
         pairs = sorted((float(np.linalg.norm(figure.place - member.place)), member.number, n)
                        for member in self.members for n, figure in enumerate(figures))  # fmt: skip
         of = dict[int, Figure]()
@@ -82,7 +82,7 @@ class Group:
             for number, figure in of.items():
                 member = self.members[number - 1]
                 if member.state is None or member.state.status != "tracked":
-                    self.begin(member, time, figure, self.drawn(), points, masks)
+                    self.begin(member, time, figure, self.drawn(), points, seen.masks)
 
     @property
     def present(self) -> list[Member]:
@@ -94,13 +94,11 @@ class Group:
         """Whether all people are tracked and no other seems to come: else what bodies leave unexplained says nothing about cameras."""
         return not self.coming and all(member.state is not None and member.state.status == "tracked" for member in self.present)
 
-    def next(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None], images: Images = (),
-             shadows: Sequence[Mask | None] = ()) -> None:
-        """Update all people by a frame's surface points and masks (H, W), the images that fit these, and what was taken for shadow
-        (H / 2, W / 2), one per camera."""
+    def next(self, time: float, points: SurfacePoints, seen: Seen, images: Images = ()) -> None:
+        """Update all people by a frame set's surface points and silhouettes, and the images that fit these, one per camera."""
         people = {member.number: Person(member.subject.tracker, member.rng, member.state)
                   for member in self.present if member.state is not None}  # fmt: skip
-        for number, share in step(people, points, masks).items():
+        for number, share in step(people, points, seen.masks).items():
             member = self.members[number - 1]
             member.state, member.share = share.state, share
             lost = share.state.status == "lost"
@@ -109,16 +107,16 @@ class Group:
             list(pool.map(lambda number: face_the_way(self.members[number - 1], time), people))  # raises what one of them raised
         if time >= self.due:
             self.due = time + LOOK_SECONDS
-            self._look(time, points, masks, images, shadows)
+            self._look(time, points, seen, images)
         for member in self.present:
             if member.lost_since is not None and time - member.lost_since >= GONE_SECONDS:
                 member.state = member.share = member.lost_since = member.before = None
 
-    def _look(self, time: float, points: SurfacePoints, masks: Sequence[Mask | None], images: Images,
-              shadows: Sequence[Mask | None]) -> None:
+    def _look(self, time: float, points: SurfacePoints, seen: Seen, images: Images) -> None:
         """See who is who, and find new, returning and lost people among the figures that no tracked body explains."""
         drawn = {member.number: member.share.drawn for member in self.present if member.share is not None and member.lost_since is None}
-        figures = find_people(self.floor, masks, explained(drawn, len(masks)), shadows)
+        masks = seen.masks
+        figures = find_people(self.floor, masks, explained(drawn, len(masks)), seen.shadows)
         places = [place_of(member.subject.body, member.state) for member in self.present
                   if member.state is not None and member.lost_since is None]  # fmt: skip
         free = [figure for figure in figures if all(np.linalg.norm(place - figure.place) > SAME_PLACE for place in places)]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.camera.rasterize import Bits
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError, warn
 from shadowpuppet.io.motion.motion_files import read_truth
@@ -215,12 +216,12 @@ class PeopleRun:
                     continue
                 timer.add(decode=seen.decoding, segment=seen.segmenting)
                 with timer.time("hull"):
-                    points = group.hull.points(masks)
+                    points, shown = group.hull.points(masks), Seen(tuple(masks), seen.shadows)
                 with timer.time("track"):
                     if not begun and len(points.points):
                         begun = True
-                        group.start(seen.time, points, masks, seen.shadows)
-                    group.next(seen.time, points, masks, seen.corrected if options.appearance else (), seen.shadows)
+                        group.start(seen.time, points, shown)
+                    group.next(seen.time, points, shown, seen.corrected if options.appearance else ())
                 with timer.time("write"):
                     found = self._write(group, seen, stack, places)
                     clear.append(group.is_clear)

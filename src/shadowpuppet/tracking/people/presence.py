@@ -56,11 +56,11 @@ class Followed:
 
 
 def sure_number(figures: Sequence[Figure]) -> int:
-    """Number of people in a frame set's figures, the most certain first: without those beyond the second that have less than a whole view of
-    evidence, as what bodies leave over where they reach beyond their figures may look like a person, and without uncertain ones close to
-    another."""
-    apart = [figure for n, figure in enumerate(figures)
-             if figure.evidence >= CERTAIN or all(np.linalg.norm(figure.place - other.place) >= CLOSE for other in figures[:n])]  # fmt: skip
+    """Number of people in a frame set's figures, the most certain first: without uncertain ones close to another, and without those beyond
+    the second that have less than a whole view of evidence, as what bodies leave over where they reach beyond their figures may look like
+    a person."""
+    apart = [one for n, one in enumerate(figures)
+             if one.evidence >= CERTAIN or all(np.linalg.norm(one.place - other.place) >= CLOSE for other in figures[:n])]  # fmt: skip
     return max(sum(figure.evidence >= SURE for figure in apart), min(len(apart), 2))
 
 
