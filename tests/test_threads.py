@@ -55,3 +55,6 @@ def test_items_are_made_once_when_they_are_asked_for():
     with pytest.raises(IndexError):
         items[6]
     assert not MadeOnDemand(make, 0)
+    items = MadeOnDemand(make, 2)
+    assert (items[1], items[0]) == ("1", "0")
+    assert items._make is None  # what they are made from is not kept longer than needed

@@ -107,6 +107,17 @@ def test_specks_go_and_a_hand_that_nearly_touches_stays():
     assert not main_part(mask, np.zeros(mask.shape, bool)).any()
 
 
+def test_of_several_people_one_far_away_stays():
+    """Three people who are seen as one part, and a fourth whose area is a thirtieth of theirs."""
+    mask = np.zeros((120, 120), np.uint8)
+    mask[10:100, 5:70] = 1
+    mask[30:54, 90:98] = 1
+    mask[110:113, 110:113] = 1  # a speck
+    kept = main_part(mask, mask > 0, several=True)
+    assert (kept == (mask & (np.arange(120) < 105))).all()
+    assert not main_part(mask, mask > 0)[30:54, 90:98].any()
+
+
 def test_small_holes_are_filled_and_gaps_and_notches_are_not():
     mask = np.zeros((80, 80), np.uint8)
     mask[10:80, 10:70] = 1

@@ -41,7 +41,8 @@ def holds(polygons: Sequence[Array], point: Array) -> bool:
     return count % 2 == 1
 
 
-def viewing_edges(ray: Array, view: int, cameras: Sequence[Camera], polygons: Sequence[Sequence[Array]], tolerated: int) -> Array:
+def viewing_edges(ray: Array, view: int, cameras: Sequence[Camera], polygons: Sequence[Sequence[Array]], tolerated: int,
+                  longest: float) -> Array:
     """Depths (E, 2) of a ray (3,), z = 1, of a view that the others leave; their polygons are on the plane z = 1."""
     others = [j for j in range(len(cameras)) if j != view]
     relative = {j: cameras[j].T_camera_world @ inverse(cameras[view].T_camera_world) for j in others}
@@ -60,9 +61,9 @@ def viewing_edges(ray: Array, view: int, cameras: Sequence[Camera], polygons: Se
                 if start > NEAR_PLANE and ends[k] < FAR and ends[k] - start > MIN_LENGTH and seen >= needed:
                     out.append((start, ends[k]))
                 start = None
-        if out:
-            return np.array(out)
-    return np.zeros((0, 2))
+        if any((end - start) * np.linalg.norm(ray) <= longest for start, end in out):
+            break
+    return np.array(out).reshape(-1, 2)
 
 
 def _crossings(ray: Array, T: Array, polygons: Sequence[Array]) -> Array:

@@ -75,6 +75,7 @@ def test_no_soles_or_nothing_that_stands_has_no_contacts():
     assert contacts_of(table(np.column_stack([3 * TIMES] * 3))) is None
     assert contacts_of(table(np.full((180, 3), np.nan))) is None
     assert np.isnan(floor_height(np.zeros((9, 1)), np.ones((9, 1))))
+    assert floor_height(np.array([[0.0]] + 20 * [[1.0]]), np.zeros((21, 1))) == pytest.approx(1.0)  # the percentile is between them
 
 
 def test_events_are_strikes_and_offs_of_the_whole_foot():

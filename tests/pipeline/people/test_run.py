@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from solids import Ellipsoid, ring, seen_by
 
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import NOTED, FormatError, SettingsError, ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_about
 from shadowpuppet.io.checkpoint import FRAMES as EXACT
@@ -187,9 +188,13 @@ def test_the_number_is_said(run):
     assert set(run.metrics["people"]) == {1, 2}
 
 
+def sets_of(sets):
+    return [Seen(tuple(masks)) for masks in sets]
+
+
 def test_sizes_are_measured_where_people_are_apart(seen):
     rig, masks = seen
-    census = take_census(rig, masks)
+    census = take_census(rig, sets_of(masks))
     assert census is not None
     assert census.number == 2
     assert census.numbers == (2,) * FRAMES
@@ -210,16 +215,16 @@ def test_a_picture_that_is_all_silhouette_shows_nobody():
     made = cameras()
     alone = [seen_by(camera, standing(0.9, -0.2)) for camera in made]
     full = [np.ones_like(alone[0]), *alone[1:]]
-    census = take_census(made, [full] * 3)
+    census = take_census(made, sets_of([full] * 3))
     assert census is not None
     assert census.numbers == (1, 1, 1)
-    assert [len(figures) for figures in first_people(census.floor, [0.0, 0.1, 0.2], [full] * 3)[1]] == [1, 1, 1]
+    assert [len(figures) for figures in first_people(census.floor, [0.0, 0.1, 0.2], sets_of([full] * 3))[1]] == [1, 1, 1]
 
 
 def test_who_comes_later_is_counted(seen):
     rig, masks = seen
     alone = [[seen_by(camera, people(n)[0]) for camera in rig] for n in range(FRAMES)]
-    census = take_census(rig, alone, masks)
+    census = take_census(rig, sets_of(alone), sets_of(masks))
     assert census is not None
     assert census.number == 2
     assert census.numbers == (1,) * FRAMES + (2,) * FRAMES
@@ -228,7 +233,7 @@ def test_who_comes_later_is_counted(seen):
 def test_who_is_there_for_a_twelfth_of_the_film_is_counted(seen):
     rig, masks = seen
     alone = [[seen_by(camera, people(n)[0]) for camera in rig] for n in range(FRAMES)]
-    census = take_census(rig, alone * 2, [*alone, *alone[:4], *masks[:2]])
+    census = take_census(rig, sets_of(alone * 2), sets_of([*alone, *alone[:4], *masks[:2]]))
     assert census is not None
     assert census.number == 2
 

@@ -72,7 +72,7 @@ def naive_score(pixels, state) -> float:
 def test_the_kernel_is_its_plain_twin():
     rng = np.random.default_rng(0)
     pixels = rng.integers(-1, 60, (7, len(HEIGHTS), 3, POINTS)).astype(np.int32)
-    state = rng.integers(0, 3, (3, 60)).astype(np.uint8)
+    state = rng.integers(0, 4, (3, 60)).astype(np.uint8)
     scores = np.full((7, len(HEIGHTS)), -np.inf)
     _score(pixels, np.arange(7), state, np.arange(3), ROWS, EMPTY, 2, scores)
     expected = [[naive_score(pixels[n, h], state) for h in range(len(HEIGHTS))] for n in range(7)]
@@ -109,6 +109,20 @@ def test_nobody_and_one(rig):
     assert find_people(floor, seen(made)) == []
     assert len(find_people(floor, seen(made, body(0, 0)))) == 1
     assert find_people(floor, [None] * len(made)) == []
+
+
+def test_legs_taken_for_shadow_are_no_evidence_against_people(rig):
+    """Trousers like the floor, in three of four cameras: without legs there is no person, unless something may be legs."""
+    made, floor = rig
+    person, (head, trunk) = body(0.5, 0.2), (body(0.5, 0.2)[1], body(0.5, 0.2)[0])
+    whole, without = seen(made, person), seen(made, [head, trunk])
+    masks = [*without[:3], whole[3]]
+    shadows = [(one & ~other)[::2, ::2] for one, other in zip(whole, masks)]
+    (sure,), (hardly,) = find_people(floor, masks, shadows=shadows), find_people(floor, masks)
+    assert sure.evidence > hardly.evidence + 1
+    assert np.allclose(sure.place, (0.5, 0.2), atol=0.1)
+    assert sure.height == pytest.approx(1.7, abs=0.08)  # what is taken for shadow above the head is no head
+    assert find_people(floor, seen(made), shadows=[mask[::2, ::2] for mask in whole]) == []  # a shadow alone is nobody
 
 
 def test_a_camera_that_is_all_silhouette_is_no_evidence(rig):
@@ -253,9 +267,19 @@ def test_a_number_counts_if_it_is_seen_often(numbers, people):
 @pytest.mark.parametrize(("evidence", "sure", "certain"), [
     ((), 0, 0), ((0.7,), 1, 0), ((3.0, 0.7), 2, 1), ((3.0, 2.0, 0.9), 2, 2), ((3.0, 2.0, 1.1, 0.8), 3, 2), ((0.9, 0.8, 0.7), 2, 0)])
 def test_weak_figures_beside_two_people_do_not_count(evidence, sure, certain):
-    figures = [Figure(np.zeros(2), 1.7, each) for each in evidence]
+    figures = [Figure(np.array([n, 0.0]), 1.7, each) for n, each in enumerate(evidence)]
     assert sure_number(figures) == sure
     assert certain_number(figures) == certain
+
+
+def test_a_weak_figure_close_to_another_is_a_part_of_that_person():
+    """The legs of one who sits; two who shake hands are certain, both."""
+    def pair(evidence: float, away: float) -> list[Figure]:
+        return [Figure(np.zeros(2), 1.4, 2.8), Figure(np.array([away, 0.0]), 1.0, evidence)]
+
+    assert sure_number(pair(1.4, 0.5)) == 1
+    assert sure_number(pair(1.4, 0.8)) == sure_number(pair(1.6, 0.5)) == 2
+
 
 
 def test_a_second_person_who_is_certain_counts_where_there_are_few_frames_of_them():

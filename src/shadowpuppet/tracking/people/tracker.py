@@ -35,6 +35,9 @@ from shadowpuppet.tracking.unexplained import near
 
 TOUCHING = 0.25
 """Distance of two people's bodies below which they are estimated twice in a frame: the second time on evidence divided by the first."""
+SIDED = 0.05
+"""Least difference in overlap, in one frame, between a body and the same turned round that tells the front from the back: more than two
+searches may differ by."""
 VIEWS = 3
 """Number of views that must show most of a person apart from others for sizes to be measured."""
 SHOWN, SIDE = 0.6, np.radians(45)
@@ -123,7 +126,7 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
     other = _facing_the_other_way(person, rng, found, observation)
     best = max(found, other, key=lambda state: np.nan_to_num(state.overlap))
     share = Share(best, own, list(masks), draw_person(person, best.pose), observation.left_out)
-    return Begun(_judged(best), bool(abs(found.overlap - other.overlap) >= CLEARLY) and shows_side(person, share))
+    return Begun(_judged(best), bool(abs(found.overlap - other.overlap) >= SIDED) and shows_side(person, share))
 
 
 def turn_round(person: MultiviewTracker, rng: np.random.Generator, share: Share) -> MultiviewState:

@@ -253,6 +253,20 @@ def test_a_limb_is_kept_where_one_mask_has_a_gap(count):
     assert ((kept.normals * LIMB.normals(kept.points)).sum(1)[gap[1]] > 0.8).all()
 
 
+def test_long_edges_elsewhere_do_not_count():
+    """Where people stand around, rays leave most pictures within the silhouette of one who is near a camera."""
+    cameras = ring(6)
+    places = [(*(0.76 * camera.centre[:2] + (0.2, 0.25)), 0.3) for camera in cameras[1::2]]
+    around = [Ellipsoid(place, (0.2, 0.2, 0.8)) for place in places]
+    masks, rows = masks_of(cameras, LIMB, *around), np.arange(240)[:, None] - cameras[0].project(LIMB.centre)[1]
+    (without,) = masks_of(cameras[:1], *around)
+    masks[0] = without | (masks[0] & (np.abs(rows) > 15))
+    points = [VisualHull(cameras, HullSettings(tolerated=t)).points(masks).points for t in (0, 1)]
+    gap = [(np.linalg.norm(p - LIMB.centre, axis=1) < 0.15) & (np.abs(p[:, 2] - LIMB.centre[2]) < 0.1) for p in points]
+    assert gap[0].sum() == 0
+    assert gap[1].sum() > 45
+
+
 def test_as_many_may_be_wrong_as_are_tolerated():
     cameras = ring(9)
     masks = masks_of(cameras, LIMB)
@@ -360,7 +374,7 @@ def test_viewing_edges_are_the_plain_ones(scene, tolerated, rng):
     polygons = [[s.lines[a : b - 1] for a, b in pairwise(s.ends)] for s in silhouettes]
     assert len(found) > 10
     for (n, *ray), pairs in found.items():
-        expected = naive_hull.viewing_edges(np.array(ray), n, cameras, polygons, tolerated)
+        expected = naive_hull.viewing_edges(np.array(ray), n, cameras, polygons, tolerated, made.settings.longest)
         np.testing.assert_allclose(np.array(pairs), expected, atol=1e-7)
 
 
