@@ -12,7 +12,7 @@ from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.people import tracker as module
 from shadowpuppet.tracking.people.evidence import Drawn, draw_person
-from shadowpuppet.tracking.people.tracker import Person, Share, at_pose, keep_front, step, turn_round
+from shadowpuppet.tracking.people.tracker import Person, Share, at_pose, keep_front, step, tells_front, turn_round
 
 POSE = actor.stance(actor.body().skeleton, 0.3, 0.2)
 HEADING = 3
@@ -24,6 +24,12 @@ def person() -> MultiviewTracker:
 
 def at(tracker: MultiviewTracker, pose, overlap: float = 0.8) -> MultiviewState:
     return at_pose(tracker, MultiviewState(pose, 0 * pose, None, 0.0, overlap, "tracked"), pose)
+
+
+@pytest.mark.parametrize(("overlap", "other", "tells"), [
+    (0.87, 0.83, True), (0.83, 0.87, True), (0.87, 0.86, False), (0.60, 0.71, True), (0.74, 0.77, False), (0.8, np.nan, False)])  # fmt: skip
+def test_a_front_is_told_by_bodies_that_fit_well_or_very_differently(overlap, other, tells):
+    assert tells_front(overlap, other) == tells
 
 
 def test_a_body_beside_takes_its_points(rng):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from functools import partial
@@ -51,11 +52,13 @@ from shadowpuppet.pipeline.progress import (
 from shadowpuppet.pipeline.rig import FrameSet, Rig, read_frames
 from shadowpuppet.pipeline.subject import joint_names, motion_frame
 from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
+from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.frozen import Interval
 from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.people.exchanges import given_back
 from shadowpuppet.tracking.people.facing import Doubted
+from shadowpuppet.tracking.people.presence import Followed
 from shadowpuppet.tracking.people.tracker import place_of
 from shadowpuppet.video import write_frames
 
@@ -177,11 +180,18 @@ class PeopleRun:
             return group
         people, every = first_people(floor, first.times, [first.seen(n) for n in range(len(first.times))])
         seen = {n: Look(figures, masks, ()) for n, (figures, masks) in enumerate(zip(every, first.masks))}
-        for found in people:
+
+        def measured(found: Followed, seed: int) -> MultiviewSubject | None:
             try:
-                group.add(fit(for_fit, seen_in(found, seen)), found.height, found.figures[0].place)
+                return fit(np.random.default_rng(seed), seen_in(found, seen))
             except TrackingError:
-                continue  # may be found later
+                return None  # may be found later
+
+        with ThreadPoolExecutor(usable_cores(), "sizes") as pool:
+            subjects = list(pool.map(measured, people, for_fit.integers(2**63, size=len(people)).tolist()))
+        for found, subject in zip(people, subjects):
+            if subject is not None:
+                group.add(subject, found.height, found.figures[0].place)
         return group
 
     def _follow(self, group: Group, stack: ExitStack, carried: Carried | None) -> None:

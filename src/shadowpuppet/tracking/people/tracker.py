@@ -35,9 +35,9 @@ from shadowpuppet.tracking.unexplained import near
 
 TOUCHING = 0.25
 """Distance of two people's bodies below which they are estimated twice in a frame: the second time on evidence divided by the first."""
-SIDED = 0.05
-"""Least difference in overlap, in one frame, between a body and the same turned round that tells the front from the back: more than two
-searches may differ by."""
+SIDED = 0.2
+"""Least difference in overlap, in one frame, between a body and the same turned round that tells the front from the back, over what the
+better one lacks of an overlap of 1: silhouettes that no body fits well tell little."""
 VIEWS = 3
 """Number of views that must show most of a person apart from others for sizes to be measured."""
 SHOWN, SIDE = 0.6, np.radians(45)
@@ -116,17 +116,21 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
     for other in drawn.values():
         mine &= other.distances(points.points) > 0.05
     own = picked(points, mine)
-    rough = PersonObservation(person.views, own, masks)
-    if not person.is_present(rough):
+    if not person.is_present(PersonObservation(person.views, own, masks)):
         return None
-    found = person.search(rng, PersonObservation(person.views, own, [None] * len(masks)))  # the points alone: where the person is
-    body = draw_person(person, found.pose)
+    rough = person.first_guess(rng, PersonObservation(person.views, own, [None] * len(masks)))  # the points alone: where the person is
+    body = draw_person(person, rough.pose)
     observation = PersonObservation(person.views, own, masks, None, ignored_pixels(body, list(drawn.values()), masks))
     found = person.search(rng, observation)  # beside others front and back hardly differ: both are tried
     other = _facing_the_other_way(person, rng, found, observation)
     best = max(found, other, key=lambda state: np.nan_to_num(state.overlap))
     share = Share(best, own, list(masks), draw_person(person, best.pose), observation.left_out)
-    return Begun(_judged(best), bool(abs(found.overlap - other.overlap) >= SIDED) and shows_side(person, share))
+    return Begun(_judged(best), tells_front(found.overlap, other.overlap) and shows_side(person, share))
+
+
+def tells_front(overlap: float, other: float) -> bool:
+    """Whether the overlaps of a body and of the same facing the other way tell the front from the back."""
+    return bool(abs(overlap - other) >= SIDED * (1 - max(overlap, other)))
 
 
 def turn_round(person: MultiviewTracker, rng: np.random.Generator, share: Share) -> MultiviewState:
@@ -178,9 +182,11 @@ def _facing_the_other_way(person: MultiviewTracker, rng: np.random.Generator, st
                           observation: PersonObservation) -> MultiviewState:
     """The state of the body facing the other way: of the same pose turned round, or searched for, whichever fits better; lost if both come
     round again."""
-    heading = person.body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
-    turned = settle(_turned_round(person, state), lambda other: person.cycle(rng, other, observation))
-    found = person.search(rng, observation, float(state.pose[heading]) + np.pi)
+    heading, seed = person.body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0], int(rng.integers(2**63))  # one generator for each thread
+    with ThreadPoolExecutor(min(2, usable_cores()), "other way") as pool:
+        search = pool.submit(person.search, np.random.default_rng(seed), observation, float(state.pose[heading]) + np.pi)
+        turned = settle(_turned_round(person, state), lambda other: person.cycle(rng, other, observation))
+        found = search.result()
     other = [each for each in (turned, found) if np.cos(each.pose[heading] - state.pose[heading]) < 0]
     return max(other, key=lambda each: np.nan_to_num(each.overlap)) if other else turned._replace(status="lost", overlap=0.0)
 
