@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from solids import Ellipsoid, ring, seen_by
 
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.people.figures import EMPTY, NEW, ROWS, Figure, _height, _score, drawn, find_floor, find_people, telling
 from shadowpuppet.tracking.people.floor import (
@@ -194,13 +195,13 @@ def test_the_floor_is_found_though_the_hull_reaches_below_it():
     made = cameras(3)
     masks = seen(made, body(-1, 0.3), body(1, 0))
     points = np.concatenate([VisualHull(made).points(masks).points, [[0.0, 0, -0.8]] * 40])
-    assert find_floor(made, points, [masks]).level == pytest.approx(0.0, abs=0.06)
+    assert find_floor(made, points, [Seen(tuple(masks))]).level == pytest.approx(0.0, abs=0.06)
 
 
 def test_the_floor_is_the_world_s_where_figures_fit_it_nearly_as_well():
     made = cameras(4)
     masks = seen(made, body(-1, 0.3), body(1, 0))
-    assert find_floor(made, VisualHull(made).points(masks).points, [masks]).level == 0.0
+    assert find_floor(made, VisualHull(made).points(masks).points, [Seen(tuple(masks))]).level == 0.0
 
 
 def test_a_floor_that_is_not_the_world_s_is_found():
@@ -208,7 +209,7 @@ def test_a_floor_that_is_not_the_world_s_is_found():
     drop[2, 3] = 0.5  # the same scene in a world whose origin is half a metre above the floor
     moved = [replace(camera, T_camera_world=camera.T_camera_world @ drop) for camera in made]
     masks = seen(made, body(-1, 0.3), body(1, 0))
-    assert find_floor(moved, VisualHull(moved).points(masks).points, [masks]).level == pytest.approx(-0.5, abs=0.06)
+    assert find_floor(moved, VisualHull(moved).points(masks).points, [Seen(tuple(masks))]).level == pytest.approx(-0.5, abs=0.06)
 
 
 def test_each_level_is_tried_once_and_what_floors_share_is_projected_once(monkeypatch):
@@ -220,7 +221,7 @@ def test_each_level_is_tried_once_and_what_floors_share_is_projected_once(monkey
 
     monkeypatch.setattr(Ground, "at", tried)
     points = VisualHull(made).points(masks := seen(made, body(-1, 0.3))).points
-    found = find_floor(made, points, [masks])
+    found = find_floor(made, points, [Seen(tuple(masks))])
     assert len(levels) == len(set(levels)) <= 13
     ground = Ground.under(made, points)
     shared = [at(ground, level).pixels for level in (-0.3, 0.15, found.level)]

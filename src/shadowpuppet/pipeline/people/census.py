@@ -93,7 +93,7 @@ def take_census(cameras: Sequence[Camera], sets: Sequence[Seen], later: Sequence
         everywhere = np.concatenate(points) if points else np.zeros((0, 3))
         if len(everywhere) < FEW_POINTS:
             return None
-        floor = find_floor(cameras, everywhere, [sets[n].masks for n in evenly_spread(len(sets), FLOOR_SETS)])
+        floor = find_floor(cameras, everywhere, [sets[n] for n in evenly_spread(len(sets), FLOOR_SETS)])
         every = list(pool.map(lambda seen: find_people(floor, seen.masks, shadows=seen.shadows), sets))
     numbers, certain = tuple(map(sure_number, every)), [certain_number(figures) for figures in every]
     return Census(max(counted(numbers[:begun]), counted(numbers[begun:]), counted(certain, share=0.0)), floor, numbers)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.mask import Mask, Seen, may_be_person
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
 from shadowpuppet.threads import usable_cores
@@ -43,8 +43,8 @@ TRIED_REACH, TRIED_NEAR = 0.3, 0.5
 """Distance (m) beyond the surface points to which floors reach that are only tried, and greatest distance of their places from a point."""
 COARSE, FINE = np.array([-10, 0, 10]), np.arange(-15, 20, 5)
 """Levels (cm) of the floor that are tried about the best so far, one after the other."""
-ALIKE = 0.95
-"""Share of the greatest evidence from which a level counts as alike."""
+ALIKE, ALIKE_AT_ZERO = 0.95, 0.9
+"""Share of the greatest evidence from which a level counts as alike; the same for the world's floor, which by convention is at 0."""
 
 
 class Figure(NamedTuple):
@@ -104,14 +104,14 @@ def _without_ghosts(floor: Floor, seen: tuple[Sequence[Mask | None], ...], found
     return kept
 
 
-def find_floor(cameras: Sequence[Camera], points: Array, sets: Sequence[Sequence[Mask | None]]) -> Floor:
-    """The floor on which figures explain most of some frame sets' masks (H, W). `points`: surface points (P, 3), world, metres, of all
-    people. Where few cameras see a person the hull reaches below the floor, so that the lowest points alone do not say where it is."""
+def find_floor(cameras: Sequence[Camera], points: Array, sets: Sequence[Seen]) -> Floor:
+    """The floor on which figures explain most of what some frame sets show. `points`: surface points (P, 3), world, metres, of all people.
+    Where few cameras see a person the hull reaches below the floor, so that the lowest points alone do not say where it is."""
     ground, tried = Ground.under(cameras, points, TRIED_REACH, TRIED_NEAR), dict[int, float]()
 
     def evidence(level: int) -> float:
         floor = ground.at(level / 100)
-        return sum(figure.evidence for masks in sets for figure in find_people(floor, masks))
+        return sum(figure.evidence for seen in sets for figure in find_people(floor, seen.masks, shadows=seen.shadows))
 
     def evidences(levels: NDArray[np.int64]) -> Array:
         new = [level for level in dict.fromkeys(levels.tolist()) if level not in tried]
@@ -123,8 +123,8 @@ def find_floor(cameras: Sequence[Camera], points: Array, sets: Sequence[Sequence
         levels = levels[np.argmax(evidences(levels))] + COARSE
         levels = levels[np.argmax(evidences(levels))] + FINE
         found, (at_zero,) = evidences(levels), evidences(np.zeros(1, np.int64))
-    if at_zero >= ALIKE * found.max():
-        return floor_under(cameras, points, 0.0)  # the world's, by convention: where silhouettes lack feet figures fit many levels alike
+    if at_zero >= ALIKE_AT_ZERO * found.max():
+        return floor_under(cameras, points, 0.0)  # where silhouettes lack feet figures fit many levels alike
     # evidence changes little within some centimetres, so that the greatest is chance: the middle of the levels with nearly as much
     return floor_under(cameras, points, float(np.average(levels, weights=np.maximum(found - ALIKE * found.max(), 1e-9))) / 100)
 
