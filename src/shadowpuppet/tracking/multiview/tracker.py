@@ -163,15 +163,12 @@ class MultiviewTracker:
         return self.judge(pose, pose - state.pose, particles, observation, weigh)
 
     def search(self, rng: np.random.Generator, observation: MultiviewObservation, facing: float | None = None) -> MultiviewState:
-        """A state from this frame alone: `first_guess`, refined by further cycles."""
-        state = self.first_guess(rng, observation, facing)
-        return settle(state, lambda each: self.cycle(rng, each, observation)._replace(velocity=np.zeros_like(each.pose)))
-
-    def first_guess(self, rng: np.random.Generator, observation: MultiviewObservation, facing: float | None = None) -> MultiviewState:
-        """A state at rest from this frame alone: the best of many poses in all directions, or about `facing` (rad)."""
+        """A state from this frame alone: the best of many poses in all directions, or about `facing` (rad), refined."""
         weigh = self.weigh(observation)
         found = pose_search.search(rng, self.body, self.refiner, observation, self.library, weigh, self.number, facing)
-        return self.judge(found.best, np.zeros_like(found.best), found, observation, weigh)
+        still = np.zeros_like(found.best)
+        state = self.judge(found.best, still, found, observation, weigh)
+        return settle(state, lambda state: self.cycle(rng, state, observation)._replace(velocity=still))
 
     def weigh(self, observation: MultiviewObservation) -> Weigh:
         """The function from poses (N, D) to costs (N,), m^2, and log weights (N,)."""

@@ -118,7 +118,7 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
     own = picked(points, mine)
     if not person.is_present(PersonObservation(person.views, own, masks)):
         return None
-    rough = person.first_guess(rng, PersonObservation(person.views, own, [None] * len(masks)))  # the points alone: where the person is
+    rough = person.search(rng, PersonObservation(person.views, own, [None] * len(masks)))  # the points alone: where the person is
     body = draw_person(person, rough.pose)
     observation = PersonObservation(person.views, own, masks, None, ignored_pixels(body, list(drawn.values()), masks))
     found = person.search(rng, observation)  # beside others front and back hardly differ: both are tried
