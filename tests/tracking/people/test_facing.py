@@ -120,3 +120,12 @@ def test_a_body_that_is_lost_loses_the_trial():
     for n in range(16):
         trial.add(n / 10, SimpleNamespace(overlap=np.nan), 0.6)
     assert trial.is_right(1.6) is True
+
+
+@pytest.mark.parametrize(("late", "right"), [(0.05, True), (0.0, None), (-0.05, None)])
+def test_a_trial_whose_difference_fades_goes_on(late, right):
+    """The body turned round needs a while to settle: until then it fits worse, whichever way the person faces."""
+    trial = Trial(0.0, SimpleNamespace(overlap=0.7))
+    for n in range(16):
+        trial.add(n / 10, SimpleNamespace(overlap=0.7), 0.7 + (0.08 if n < 12 else late))
+    assert trial.is_right(1.6) is right

@@ -26,7 +26,7 @@ SETTLING, LEAST_TRIAL, LONGEST_TRIAL = 0.4, 1.0, 3.0
 LEAST_LEADS = 3
 """Number of frames that show the person from the side from which on a trial is decided."""
 CLEARLY = 0.02
-"""Least mean difference of the overlaps that decides."""
+"""Least mean difference of the overlaps that decides, of all frames and of the last third: a pose turned round takes time to settle."""
 
 
 class Trial:
@@ -49,8 +49,8 @@ class Trial:
         """Whether the body as it is faces the right way; None if that is not clear yet."""
         if time - self.begun < LEAST_TRIAL or len(self.leads) < LEAST_LEADS:
             return None
-        lead = float(np.mean(self.leads))
-        return lead > 0 if abs(lead) >= CLEARLY else None
+        lead, lately = (float(np.mean(each)) for each in (self.leads, self.leads[-max(len(self.leads) // 3, 1) :]))
+        return lead > 0 if min(lead * np.sign(lead), lately * np.sign(lead)) >= CLEARLY else None
 
 
 class Part(NamedTuple):
