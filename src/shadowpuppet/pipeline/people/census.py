@@ -86,7 +86,7 @@ def _at(footage: Footage, silhouettes: Silhouettes, times: Array) -> Iterator[Se
 
 def take_census(cameras: Sequence[Camera], sets: Sequence[Seen], later: Sequence[Seen] = ()) -> Census | None:
     """The people in frame sets of the film's beginning and of what comes `later`; None if nothing is seen by two cameras."""
-    hull, begun = VisualHull(cameras), len(sets)
+    hull, begun = VisualHull(cameras, company=True), len(sets)
     sets = [seen._replace(masks=tuple(telling(seen.masks))) for seen in (*sets, *later)]
     with ThreadPoolExecutor(usable_cores(), "census") as pool:
         points = [surface.points for surface in pool.map(lambda seen: hull.points(seen.masks), sets)]

@@ -174,7 +174,7 @@ class PeopleRun:
         def fit(rng: np.random.Generator, sets: Sequence[Any]) -> MultiviewSubject:
             return fit_apart(rng, self.rig.cameras, floor, self.options, rate, sets)
 
-        group = Group(floor, VisualHull(self.rig.cameras, self.options.multiview.hull), fit, for_track)
+        group = Group(floor, VisualHull(self.rig.cameras, self.options.multiview.hull, company=True), fit, for_track)
         if carried is not None:
             restore(group, carried.group, lambda held: remade(for_fit, self.rig.cameras, self.options, rate, held))
             return group

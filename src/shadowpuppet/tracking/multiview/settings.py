@@ -27,7 +27,7 @@ class HullSettings:
     """Points on a viewing edge are at most this far apart (m)."""
     tolerated: Annotated[int, Field(ge=0, le=100)] = 1
     """Number of cameras that may be overruled if at least three times as many others see the person, for example if one silhouette has a
-    hole. Used only on rays that have no viewing edge of at most `longest` otherwise. 0: every camera carves."""
+    hole. Used only on rays that have no viewing edge otherwise; with several people, none of at most `longest`. 0: every camera carves."""
 
 
 @checked

@@ -261,7 +261,7 @@ def test_long_edges_elsewhere_do_not_count():
     masks, rows = masks_of(cameras, LIMB, *around), np.arange(240)[:, None] - cameras[0].project(LIMB.centre)[1]
     (without,) = masks_of(cameras[:1], *around)
     masks[0] = without | (masks[0] & (np.abs(rows) > 15))
-    points = [VisualHull(cameras, HullSettings(tolerated=t)).points(masks).points for t in (0, 1)]
+    points = [VisualHull(cameras, HullSettings(tolerated=t), company=True).points(masks).points for t in (0, 1)]
     gap = [(np.linalg.norm(p - LIMB.centre, axis=1) < 0.15) & (np.abs(p[:, 2] - LIMB.centre[2]) < 0.1) for p in points]
     assert gap[0].sum() == 0
     assert gap[1].sum() > 45
@@ -357,15 +357,16 @@ def test_the_same_masks_give_the_same_points_in_any_thread():
 
 
 @pytest.mark.kernels
+@pytest.mark.parametrize("company", [False, True])
 @pytest.mark.parametrize("tolerated", [0, 1, 2])
 @pytest.mark.parametrize("scene", ["bodies", "noise", "border"])
-def test_viewing_edges_are_the_plain_ones(scene, tolerated, rng):
+def test_viewing_edges_are_the_plain_ones(scene, tolerated, company, rng):
     lens = {"distortion": (-0.2, 0.05, 0.001, 0.0)} if scene == "bodies" else {}
     cameras = ring(6, size=(48, 40), focal=40.0 if scene != "border" else 110.0, **lens)
     masks = masks_of(cameras, TRUNK, replace(LIMB, centre=(0.3, 0.3, 0.1)), replace(BALL, centre=(-0.4, 0.2, 0.1), radii=(0.1, 0.1, 0.1)))
     if scene == "noise":
         masks = [mask ^ (cv2.blur(rng.random(mask.shape), (3, 3)) > 0.68) for mask in masks]
-    made = VisualHull(cameras, HullSettings(tolerated=tolerated, rays=30 if scene == "noise" else 60))
+    made = VisualHull(cameras, HullSettings(tolerated=tolerated, rays=30 if scene == "noise" else 60), company)
     silhouettes = [_silhouette(mask, made._views[n]) for n, mask in enumerate(masks)]
     which, rays, _, depths = made._edges(silhouettes, np.arange(6))
     found = {}
@@ -374,7 +375,7 @@ def test_viewing_edges_are_the_plain_ones(scene, tolerated, rng):
     polygons = [[s.lines[a : b - 1] for a, b in pairwise(s.ends)] for s in silhouettes]
     assert len(found) > 10
     for (n, *ray), pairs in found.items():
-        expected = naive_hull.viewing_edges(np.array(ray), n, cameras, polygons, tolerated, made.settings.longest)
+        expected = naive_hull.viewing_edges(np.array(ray), n, cameras, polygons, tolerated, made.settings.longest if company else np.inf)
         np.testing.assert_allclose(np.array(pairs), expected, atol=1e-7)
 
 

@@ -113,8 +113,7 @@ def cut_rays(camera: Indices, rays: Array, relative: Array, lines: Array, spans:
         relative: transforms (V, V, 4, 4) from view to view.
         lines: vertices (2, N) of all polygons.
         spans, circles: runs (C, 2) and their circles (3, C); view j's are those from `bounds[j]` to `bounds[j + 1]`.
-        tolerated: number of views that may deny a place, on rays that have no viewing edge of at most `longest` (m) otherwise. Longer
-            ones lie where few pictures reach, beyond the person, and nearly every ray has some.
+        tolerated: number of views that may deny a place, on rays that have no viewing edge of at most `longest` (m) otherwise.
     """
     apart = np.linalg.norm(relative[:, :, :3, 3], axis=2) > MIN_BASELINE  # no view carves its own rays
     most = lines.shape[1] + 2  # each side is crossed at most once

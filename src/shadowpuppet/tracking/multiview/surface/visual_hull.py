@@ -85,10 +85,12 @@ class VisualHull:
     Raises `CalibrationError` for fewer than two cameras, or for one without a pose in the world.
     """
 
-    def __init__(self, cameras: Iterable[Camera], settings: HullSettings | None = None) -> None:
-        """Undo the lens distortion on a grid, once."""
+    def __init__(self, cameras: Iterable[Camera], settings: HullSettings | None = None, company: bool = False) -> None:
+        """Undo the lens distortion on a grid, once. `company`: several people are seen, so that nearly every ray has long edges far away,
+        within another's silhouette, which do not count when a camera may be overruled (`tolerated`)."""
         self.cameras = tuple(cameras)
         self.settings = settings or HullSettings()
+        self._counts = self.settings.longest if company else np.inf
         if len(self.cameras) < 2:
             raise CalibrationError(f"a visual hull: found {len(self.cameras)} cameras, expected two or more")
         for camera in self.cameras:
@@ -139,7 +141,7 @@ class VisualHull:
         rays = np.concatenate([s.lines[t] for s, t in zip(silhouettes, taken)])
         rays = np.concatenate([rays, np.ones((len(rays), 1))], 1)
         outward = np.concatenate([s.outward[t] for s, t in zip(silhouettes, taken)])
-        ray, depths = cut_rays(camera, rays, *self._carving(silhouettes, which), self.settings.tolerated, self.settings.longest)
+        ray, depths = cut_rays(camera, rays, *self._carving(silhouettes, which), self.settings.tolerated, self._counts)
         return which[camera[ray]], rays[ray], outward[ray], depths
 
     def _carving(self, silhouettes: list[_Silhouette], which: NDArray[np.int64]) -> _Carving:
