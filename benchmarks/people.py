@@ -1,6 +1,6 @@
 """Several people before several cameras: are they counted, followed and not exchanged, and how much worse is each than alone?
 
-    python benchmarks/people.py FOLDER [--films N ...] [--masks]
+    python benchmarks/people.py FOLDER [--films N ...] [--shift S] [--masks]
 
 Makes the films of `FILMS` in FOLDER unless they are there, of 2, 3, 4 and 6 people before 4, 5 and 8 cameras, tracks each from the films
 (or, with `--masks`, from the exact silhouettes), and prints a line for each and what was asked of all. Films of two and three people who
@@ -210,11 +210,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--films", type=int, nargs="+", default=list(range(len(FILMS))), help="some of the films, counted from 0")
+    parser.add_argument("--shift", type=int, default=0, help="added to the films' seeds: other people, clothes and rooms")
     parser.add_argument("--masks", action="store_true", help="exact silhouettes instead of the films")
     parser.add_argument("--tiny", action="store_true", help="one film of two people, of a few small pictures")
     args = smallest.parse(parser, lambda folder: (folder, "--tiny", "--masks"))
     options, console = make_options({"masks": args.masks}), Console(width=150)
-    films = [Film("dance", 2, 3, 1, 2.0, "96x72", 2.0)] if args.tiny else [FILMS[n] for n in args.films]
+    films = [Film("dance", 2, 3, 1, 2.0, "96x72", 2.0)] if args.tiny else [replace(FILMS[n], seed=FILMS[n].seed + args.shift) for n in args.films]
     table, every, alone = Table(*COLUMNS, box=None), list[dict](), dict[str, dict[str, float]]()
     for film in films:
         every.append(measure(film, args.folder, options))
