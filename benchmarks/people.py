@@ -215,7 +215,8 @@ def main() -> None:
     parser.add_argument("--tiny", action="store_true", help="one film of two people, of a few small pictures")
     args = smallest.parse(parser, lambda folder: (folder, "--tiny", "--masks"))
     options, console = make_options({"masks": args.masks}), Console(width=150)
-    films = [Film("dance", 2, 3, 1, 2.0, "96x72", 2.0)] if args.tiny else [replace(FILMS[n], seed=FILMS[n].seed + args.shift) for n in args.films]
+    chosen = [replace(film, seed=film.seed + args.shift) for film in (FILMS[n] for n in args.films)]
+    films = [Film("dance", 2, 3, 1, 2.0, "96x72", 2.0)] if args.tiny else chosen
     table, every, alone = Table(*COLUMNS, box=None), list[dict](), dict[str, dict[str, float]]()
     for film in films:
         every.append(measure(film, args.folder, options))
