@@ -65,7 +65,7 @@ def scene(monkeypatch):
     monkeypatch.setattr(module, "follow_turned", other)
     monkeypatch.setattr(fronts, "shows_side", lambda tracker, share: now.side)
     monkeypatch.setattr(later_sizes, "shows", lambda share: False)
-    monkeypatch.setattr(module, "find_people", lambda floor, masks, explained=(), shadows=(): list(now.figures))
+    monkeypatch.setattr(module, "find_people", lambda floor, seen, explained=(): list(now.figures))
     monkeypatch.setattr(module, "explained", lambda drawn, number: [])
     monkeypatch.setattr(module, "place_of", lambda body, state: state.place)
     monkeypatch.setattr(module, "step", step)
@@ -122,7 +122,7 @@ def test_a_person_who_cannot_be_measured_is_no_person(scene):
 
 def test_first_people_are_those_who_last(monkeypatch):
     sets = [[figure(0), figure(2)], [figure(0.05)], [figure(0.1), figure(2.1)], [figure(0.1), figure(2.1), figure(5)]]
-    monkeypatch.setattr(module, "find_people", lambda floor, masks, shadows: sets[masks[0]])
+    monkeypatch.setattr(module, "find_people", lambda floor, seen: sets[seen.masks[0]])
     people, every = first_people(None, [0.0, 0.1, 0.2, 0.3], [Seen((n,)) for n in range(4)])
     assert [len(each.sets) for each in people] == [4, 3]
     assert [len(figures) for figures in every] == [2, 1, 2, 3]

@@ -198,7 +198,7 @@ def test_sizes_are_measured_where_people_are_apart(seen):
     assert census is not None
     assert census.number == 2
     assert census.numbers == (2,) * FRAMES
-    one, other = find_people(census.floor, masks[0])
+    one, other = find_people(census.floor, Seen(tuple(masks[0])))
     views = views_of(census.floor, one, [other], masks[0])
     shown = [view for view in views if view is not None]
     assert len(shown) >= 2

@@ -50,6 +50,10 @@ def seen(made, *people):
             for camera in made]
 
 
+def people_in(floor, masks, explained=(), shadows=()):
+    return find_people(floor, Seen(tuple(masks), tuple(shadows)), explained)
+
+
 @pytest.fixture(scope="module")
 def rig():
     made = cameras()
@@ -96,7 +100,7 @@ def test_interpolated_pixels_are_the_projected_ones(rig):
 
 def test_two_people_are_counted_placed_and_measured(rig):
     made, floor = rig
-    found = find_people(floor, seen(made, body(-1, 0, 1.8), body(1, 0.3, 1.3)))
+    found = people_in(floor, seen(made, body(-1, 0, 1.8), body(1, 0.3, 1.3)))
     assert len(found) == 2
     left, right = sorted(found, key=lambda figure: figure.place[0])
     assert np.allclose(left.place, (-1, 0), atol=0.1)
@@ -107,9 +111,9 @@ def test_two_people_are_counted_placed_and_measured(rig):
 
 def test_nobody_and_one(rig):
     made, floor = rig
-    assert find_people(floor, seen(made)) == []
-    assert len(find_people(floor, seen(made, body(0, 0)))) == 1
-    assert find_people(floor, [None] * len(made)) == []
+    assert people_in(floor, seen(made)) == []
+    assert len(people_in(floor, seen(made, body(0, 0)))) == 1
+    assert people_in(floor, [None] * len(made)) == []
 
 
 def test_legs_taken_for_shadow_are_no_evidence_against_people(rig):
@@ -119,11 +123,11 @@ def test_legs_taken_for_shadow_are_no_evidence_against_people(rig):
     whole, without = seen(made, person), seen(made, [head, trunk])
     masks = [*without[:3], whole[3]]
     shadows = [(one & ~other)[::2, ::2] for one, other in zip(whole, masks)]
-    (sure,), (hardly,) = find_people(floor, masks, shadows=shadows), find_people(floor, masks)
+    (sure,), (hardly,) = people_in(floor, masks, shadows=shadows), people_in(floor, masks)
     assert sure.evidence > hardly.evidence + 1
     assert np.allclose(sure.place, (0.5, 0.2), atol=0.1)
     assert sure.height == pytest.approx(1.7, abs=0.08)  # what is taken for shadow above the head is no head
-    assert find_people(floor, seen(made), shadows=[mask[::2, ::2] for mask in whole]) == []  # a shadow alone is nobody
+    assert people_in(floor, seen(made), shadows=[mask[::2, ::2] for mask in whole]) == []  # a shadow alone is nobody
 
 
 def test_a_camera_that_is_all_silhouette_is_no_evidence(rig):
@@ -131,7 +135,7 @@ def test_a_camera_that_is_all_silhouette_is_no_evidence(rig):
     masks = seen(made, body(-1, 0))
     masks[0] = np.ones_like(masks[0])
     assert telling(masks)[0] is None
-    (figure,) = find_people(floor, masks)
+    (figure,) = people_in(floor, masks)
     assert np.allclose(figure.place, (-1, 0), atol=0.15)
 
 
@@ -140,9 +144,9 @@ def test_a_ghost_is_no_person(count):
     """Two cameras whose rays through two people cross at four places: two of them are ghosts."""
     made = cameras(4)[:count]
     floor = floor_under(made, ROUND, 0.0)
-    assert len(find_people(floor, seen(made, body(-1.0, -1.0), body(1.0, 1.0)))) == 2
+    assert len(people_in(floor, seen(made, body(-1.0, -1.0), body(1.0, 1.0)))) == 2
     three = body(-1.0, -1.0), body(1.0, 1.0), body(1.0, -1.0)
-    assert len(find_people(floor, seen(made, *three))) == 3
+    assert len(people_in(floor, seen(made, *three))) == 3
 
 
 def test_somebody_cut_by_the_border_has_their_place():
@@ -151,7 +155,7 @@ def test_somebody_cut_by_the_border_has_their_place():
     near = made[0].centre[:2]
     place = near * 0.55
     masks = seen(made, body(*place), body(-0.8, 0.6))
-    found = find_people(floor_under(made, ROUND, 0.0), masks)
+    found = people_in(floor_under(made, ROUND, 0.0), masks)
     assert min(np.linalg.norm(figure.place - place) for figure in found) < 0.15
     assert len(found) == 2
 
@@ -159,14 +163,14 @@ def test_somebody_cut_by_the_border_has_their_place():
 def test_who_is_explained_is_not_found_again(rig):
     made, floor = rig
     known = [mask[::2, ::2] for mask in seen(made, body(-1, 0))]
-    (figure,) = find_people(floor, seen(made, body(-1, 0), body(1, 0.3)), known)
+    (figure,) = people_in(floor, seen(made, body(-1, 0), body(1, 0.3)), known)
     assert figure.place[0] == pytest.approx(1, abs=0.1)
 
 
 def test_people_who_hold_hands_are_two(rig):
     made, floor = rig
     arm = [Ellipsoid((0.0, 0.15, 1.0), (0.9, 0.05, 0.05))]
-    assert len(find_people(floor, seen(made, body(-0.8, 0.15), body(0.8, 0.15), arm))) == 2
+    assert len(people_in(floor, seen(made, body(-0.8, 0.15), body(0.8, 0.15), arm))) == 2
 
 
 def test_a_hole_in_a_silhouette_hides_nobody(rig):
@@ -175,18 +179,18 @@ def test_a_hole_in_a_silhouette_hides_nobody(rig):
     rows, columns = np.nonzero(masks[1])
     high, middle = np.ptp(rows) // 4, int(np.median(columns[columns < np.median(columns)]))
     masks[1][rows.min() + high : rows.max() - high, middle - 2 : middle + 2] = False
-    assert len(find_people(floor, masks)) == 2
+    assert len(people_in(floor, masks)) == 2
 
 
 def test_a_box_is_no_person(rig):
     made, floor = rig
-    assert find_people(floor, seen(made, [Ellipsoid((0, 0, 0.3), (0.25, 0.25, 0.3))])) == []
+    assert people_in(floor, seen(made, [Ellipsoid((0, 0, 0.3), (0.25, 0.25, 0.3))])) == []
 
 
 def test_a_figure_is_drawn_on_its_silhouette(rig):
     made, floor = rig
     masks = seen(made, body(0, 0))
-    (figure,) = find_people(floor, masks)
+    (figure,) = people_in(floor, masks)
     for view, mask in zip(drawn(floor, figure), masks):
         assert np.count_nonzero(view & mask[::2, ::2]) >= 0.9 * np.count_nonzero(mask[::2, ::2])
 
@@ -241,7 +245,7 @@ def test_a_figure_is_as_tall_as_its_silhouette_whatever_height_was_tried(rig):
 @given(st.floats(-1.2, 1.2), st.floats(-1.2, 1.2))
 def test_a_person_is_found_wherever_they_stand(rig, x, y):
     made, floor = rig
-    (figure,) = find_people(floor, seen(made, body(x, y)))
+    (figure,) = people_in(floor, seen(made, body(x, y)))
     assert np.allclose(figure.place, (x, y), atol=0.12)
 
 
@@ -280,7 +284,6 @@ def test_a_weak_figure_close_to_another_is_a_part_of_that_person():
 
     assert sure_number(pair(1.4, 0.5)) == 1
     assert sure_number(pair(1.4, 0.8)) == sure_number(pair(1.6, 0.5)) == 2
-
 
 
 def test_a_second_person_who_is_certain_counts_where_there_are_few_frames_of_them():

@@ -46,7 +46,7 @@ class Census:
 
     def people(self, seen: Seen) -> list[Figure]:
         """The people in one frame set."""
-        return find_people(self.floor, seen.masks, shadows=seen.shadows)
+        return find_people(self.floor, seen)
 
 
 def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes], share: Share = unshared) -> list[Seen]:
@@ -94,7 +94,7 @@ def take_census(cameras: Sequence[Camera], sets: Sequence[Seen], later: Sequence
         if len(everywhere) < FEW_POINTS:
             return None
         floor = find_floor(cameras, everywhere, [sets[n] for n in evenly_spread(len(sets), FLOOR_SETS)])
-        every = list(pool.map(lambda seen: find_people(floor, seen.masks, shadows=seen.shadows), sets))
+        every = list(pool.map(lambda seen: find_people(floor, seen), sets))
     numbers, certain = tuple(map(sure_number, every)), [certain_number(figures) for figures in every]
     return Census(max(counted(numbers[:begun]), counted(numbers[begun:]), counted(certain, share=0.0)), floor, numbers)
 

@@ -71,7 +71,7 @@ class Group:
 
     def start(self, time: float, points: SurfacePoints, seen: Seen) -> None:
         """Start the measured people, each at the nearest figure of the first frame set; arguments as for `next`."""
-        figures = find_people(self.floor, seen.masks, shadows=seen.shadows)
+        figures = find_people(self.floor, seen)
         pairs = sorted((float(np.linalg.norm(figure.place - member.place)), member.number, n)
                        for member in self.members for n, figure in enumerate(figures))  # fmt: skip
         of = dict[int, Figure]()
@@ -116,7 +116,7 @@ class Group:
         """See who is who, and find new, returning and lost people among the figures that no tracked body explains."""
         drawn = {member.number: member.share.drawn for member in self.present if member.share is not None and member.lost_since is None}
         masks = seen.masks
-        figures = find_people(self.floor, masks, explained(drawn, len(masks)), seen.shadows)
+        figures = find_people(self.floor, seen, explained(drawn, len(masks)))
         places = [place_of(member.subject.body, member.state) for member in self.present
                   if member.state is not None and member.lost_since is None]  # fmt: skip
         free = [figure for figure in figures if all(np.linalg.norm(place - figure.place) > SAME_PLACE for place in places)]
@@ -243,7 +243,7 @@ def first_people(floor: Floor, times: Sequence[float], sets: Sequence[Seen]) -> 
     each set."""
     people, every = list[Followed](), list[list[Figure]]()
     for n, (time, seen) in enumerate(zip(times, sets, strict=True)):
-        every.append(find_people(floor, seen.masks, shadows=seen.shadows))
+        every.append(find_people(floor, seen))
         people = follow(people, n, time, every[-1])
     lasting = [each for each in people if 2 * len(each.sets) >= len(sets)]
     return sorted(lasting, key=lambda each: (-len(each.sets), float(each.figures[0].place[0]))), every

@@ -58,14 +58,13 @@ class Figure(NamedTuple):
     """In views, see `NEEDED`."""
 
 
-def find_people(floor: Floor, masks: Sequence[Mask | None], explained: Sequence[Mask | None] = (),
-                shadows: Sequence[Mask | None] = ()) -> list[Figure]:
-    """The people in one frame's masks (H, W), one per camera, the most certain first.
+def find_people(floor: Floor, seen: Seen, explained: Sequence[Mask | None] = ()) -> list[Figure]:
+    """The people in one frame set, the most certain first.
 
-    Two kinds of pixels (H / 2, W / 2), by camera, are no evidence, neither for people nor against them: silhouette that people who are
-    known already explain, `explained`, and what was taken for shadow and may be dark legs, `shadows`.
+    What was taken for shadow may be dark legs, and is no evidence, neither for people nor against them; nor is silhouette in pixels
+    (H / 2, W / 2), by camera, that people who are known already explain, `explained`.
     """
-    state, used = _states(masks, explained, shadows)
+    state, used = _states(seen, explained)
     scores = np.full((len(floor.places), len(HEIGHTS)), -np.inf)
     unusual = UNUSUAL * np.abs(np.array(HEIGHTS) - USUAL)
     left, found = np.arange(len(scores)), list[Figure]()
@@ -83,15 +82,14 @@ def find_people(floor: Floor, masks: Sequence[Mask | None], explained: Sequence[
             flat = state[n, : mask.size]
             flat[mask.ravel() & (flat == NEW)] = KNOWN
         left = left[np.linalg.norm(floor.places[left] - place, axis=1) >= APART]
-    return _without_ghosts(floor, (masks, explained, shadows), found)
+    return _without_ghosts(floor, seen, explained, found)
 
 
-def _without_ghosts(floor: Floor, seen: tuple[Sequence[Mask | None], ...], found: list[Figure]) -> list[Figure]:
-    """The figures that explain something which all of the others, also those found later, leave; the least certain go first. `seen`: as for
-    `_states`."""
+def _without_ghosts(floor: Floor, seen: Seen, explained: Sequence[Mask | None], found: list[Figure]) -> list[Figure]:
+    """The figures that explain something which all of the others, also those found later, leave; the least certain go first."""
     kept = list(found)
     for figure in reversed(found) if len(found) > 2 else ():
-        state, used = _states(*seen)
+        state, used = _states(seen, explained)
         for other in kept:
             for n, mask in enumerate(drawn(floor, other) if other is not figure else ()):
                 flat = state[n, : mask.size]
@@ -111,7 +109,7 @@ def find_floor(cameras: Sequence[Camera], points: Array, sets: Sequence[Seen]) -
 
     def evidence(level: int) -> float:
         floor = ground.at(level / 100)
-        return sum(figure.evidence for seen in sets for figure in find_people(floor, seen.masks, shadows=seen.shadows))
+        return sum(figure.evidence for seen in sets for figure in find_people(floor, seen))
 
     def evidences(levels: NDArray[np.int64]) -> Array:
         new = [level for level in dict.fromkeys(levels.tolist()) if level not in tried]
@@ -162,15 +160,14 @@ def drawn(floor: Floor, figure: Figure, wide: float = WIDE) -> list[Mask]:
     return found
 
 
-def _states(masks: Sequence[Mask | None], explained: Sequence[Mask | None] = (),
-            shadows: Sequence[Mask | None] = ()) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+def _states(seen: Seen, explained: Sequence[Mask | None]) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
     """What each pixel is, (C, pixels), and the cameras that say something; arguments as for `find_people`."""
-    halves = [None if mask is None else solid(mask[::2, ::2]) for mask in telling(masks)]
+    halves = [None if mask is None else solid(mask[::2, ::2]) for mask in telling(seen.masks)]
     state = np.zeros((len(halves), max((half.size for half in halves if half is not None), default=0)), np.uint8)
     for n, half in enumerate(halves):
         if half is not None:
             state[n, : half.size] = half.ravel()
-            own, known, shade = state[n, : half.size], *(each[n] if n < len(each) else None for each in (explained, shadows))
+            own, known, shade = state[n, : half.size], *(each[n] if n < len(each) else None for each in (explained, seen.shadows))
             if known is not None:
                 own[(half & known).ravel()] = KNOWN
             if shade is not None:

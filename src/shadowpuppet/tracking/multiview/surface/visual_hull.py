@@ -90,7 +90,7 @@ class VisualHull:
         within another's silhouette, which do not count when a camera may be overruled (`tolerated`)."""
         self.cameras = tuple(cameras)
         self.settings = settings or HullSettings()
-        self._counts = self.settings.longest if company else np.inf
+        self._longest_counted = self.settings.longest if company else np.inf
         if len(self.cameras) < 2:
             raise CalibrationError(f"a visual hull: found {len(self.cameras)} cameras, expected two or more")
         for camera in self.cameras:
@@ -141,7 +141,7 @@ class VisualHull:
         rays = np.concatenate([s.lines[t] for s, t in zip(silhouettes, taken)])
         rays = np.concatenate([rays, np.ones((len(rays), 1))], 1)
         outward = np.concatenate([s.outward[t] for s, t in zip(silhouettes, taken)])
-        ray, depths = cut_rays(camera, rays, *self._carving(silhouettes, which), self.settings.tolerated, self._counts)
+        ray, depths = cut_rays(camera, rays, *self._carving(silhouettes, which), self.settings.tolerated, self._longest_counted)
         return which[camera[ray]], rays[ray], outward[ray], depths
 
     def _carving(self, silhouettes: list[_Silhouette], which: NDArray[np.int64]) -> _Carving:
