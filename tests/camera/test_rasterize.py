@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import naive
 import numpy as np
 import pytest
@@ -296,3 +298,13 @@ def test_legs_out_of_the_picture_or_behind_the_camera_are_nowhere():
 
 def test_the_upper_body_has_no_other_measures_than_its_skeleton():
     assert upper_body_skeleton(SIZES) == picture().body.skeleton
+
+
+def test_threads_that_share_a_picture_draw_what_one_alone_draws(rng):
+    of = picture(cam=camera((320, 240)))
+    poses, every = random_poses(rng, of.body.skeleton, 200), np.arange(len(of.body.parts))
+    silhouette = of.draw(np.zeros(len(of.body.skeleton.dofs)))
+    alone = of.added(poses, every, silhouette, of.empty())
+    with ThreadPoolExecutor(4) as pool:
+        for found in pool.map(lambda _: of.added(poses, every, silhouette, of.empty()), range(40)):
+            assert (found == alone).all()

@@ -9,10 +9,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from silhouette_scenes import CLEANED, METHODS, SIZE, dressed, empty_shots, figure, grey, overlap, scene, shot
 
 from shadowpuppet.errors import SettingsError, SilhouetteError
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background, ready_mask, recover_scene
+from shadowpuppet.silhouette._kernels import part_sizes, some_parts
 from shadowpuppet.silhouette.background import to_planes
 from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile
 from shadowpuppet.silhouette.channels import wardrobe_share
@@ -128,6 +132,15 @@ def test_small_holes_are_filled_and_gaps_and_notches_are_not():
     assert filled[20:22, 20:22].all()
     assert not filled[40:50, 30:40].any()
     assert not filled[78:80, 50:52].any()
+
+
+@given(arrays(np.int32, (5, 7), elements=st.integers(0, 5)), arrays(np.bool_, (5, 7)), arrays(np.bool_, 6))
+def test_parts_are_counted_and_chosen_as_by_numpy(parts, counted, chosen):
+    sizes, out = np.zeros(6, np.int64), np.empty(parts.shape, np.uint8)
+    part_sizes(parts, counted, sizes)
+    some_parts(parts, chosen, out)
+    assert (sizes == np.bincount(parts[counted], minlength=6)).all()
+    assert (out == np.isin(parts, np.flatnonzero(chosen))).all()
 
 
 def test_what_hangs_on_by_a_thread_goes_and_pinholes_are_filled():

@@ -6,10 +6,10 @@ pixel belongs to a polygon if its centre, at integer coordinates, does (half ope
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from threading import Lock
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,10 +47,6 @@ def unpack(bits: Bits, width: int) -> NDArray[np.bool_]:
 def count(bits: Bits) -> int:
     """Number of set pixels."""
     return int(np.bitwise_count(bits).sum())
-
-
-BUFFER_LOCK = Lock()
-"""Held while a kernel draws: pictures reuse their buffers and may be shared between threads."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,25 +163,27 @@ class Picture:
         tree, offsets, root = self._frame
         frame, shapes = (tree, offsets if measures is None else measures[0], root), self._shapes(measures and measures[1:])
         joints = tree[7] if joints is None else joints
-        block, page, room = self._room(len(which), min(BLOCK, max(len(poses), 1)))
+        key = len(which), min(BLOCK, max(len(poses), 1))
         poses, out = self.body.skeleton.checked(poses), np.empty(len(poses), np.int64)
-        with BUFFER_LOCK:
-            _compare(poses, joints, frame, shapes, which, self._lens, self.camera.size[0],
-                     (silhouette, fixed, *room), block, page, out, np.empty((0, 0, 0), np.uint64) if drawn is None else drawn)
+        block, page, room = buffers = self._take_buffers(*key)
+        _compare(poses, joints, frame, shapes, which, self._lens, self.camera.size[0],
+                 (silhouette, fixed, *room), block, page, out, np.empty((0, 0, 0), np.uint64) if drawn is None else drawn)
+        self._free_buffers[key].append(buffers)
         return out
 
-    def _room(self, shapes: int, size: int) -> tuple:
-        """Buffers for a comparison, made once and used under `BUFFER_LOCK`; a kernel leaves nothing in them that counts."""
-        if (shapes, size) not in self._rooms:
+    def _take_buffers(self, shapes: int, size: int) -> tuple:
+        """Buffers for a comparison, which no other thread uses meanwhile; a kernel leaves nothing in them that counts."""
+        try:
+            return self._free_buffers[shapes, size].pop()
+        except IndexError:  # all in use, or none made so far
             block = self._block(shapes, size)
             words, height = self.empty().shape
             page = make_page(words, height, block[1].shape[1])
-            self._rooms[shapes, size] = block, page, (np.zeros_like(page[0]), np.zeros_like(page[0]))
-        return self._rooms[shapes, size]
+            return block, page, (np.zeros_like(page[0]), np.zeros_like(page[0]))
 
     @cached_property
-    def _rooms(self) -> dict[tuple[int, int], tuple]:
-        return {}
+    def _free_buffers(self) -> defaultdict[tuple[int, int], list[tuple]]:
+        return defaultdict(list)
 
 
 def place(camera: Camera, distance: float, elevation: float) -> Array:

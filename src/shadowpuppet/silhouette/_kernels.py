@@ -54,6 +54,23 @@ def contrast(planes, mean, seen, out):
 
 
 @compiled(nogil=True)
+def part_sizes(parts, counted, sizes):
+    """Add to `sizes` (K,) the number of pixels of each part, of those that `counted` (H, W) has; parts: their numbers, int32 (H, W)."""
+    for y in range(parts.shape[0]):
+        for x in range(parts.shape[1]):
+            if counted[y, x]:
+                sizes[parts[y, x]] += 1
+
+
+@compiled(nogil=True)
+def some_parts(parts, chosen, out):
+    """Set `out` (H, W), uint8, to 1 for pixels of the parts that `chosen` (K,) has, else to 0; parts: their numbers, int32 (H, W)."""
+    for y in range(parts.shape[0]):
+        for x in range(parts.shape[1]):
+            out[y, x] = np.uint8(chosen[parts[y, x]])
+
+
+@compiled(nogil=True)
 def far_from_samples(image, samples, squared_radius, needed, out):
     """Set `out` (H, W) to 1 for pixels of an image (H, W, C) that are near to fewer than `needed` of the samples (N, H, W, C), else to 0.
 

@@ -49,9 +49,11 @@ def main_part(mask: Labels, sure: NDArray[np.bool_], several: bool = False) -> L
     """
     import cv2
 
-    number, labels = cv2.connectedComponents(mask, connectivity=8)
-    parts = np.asarray(labels, np.intp)
-    counts = np.bincount(parts[sure], minlength=2)
+    from shadowpuppet.silhouette._kernels import part_sizes
+
+    number, parts = _connected(mask, 8)
+    counts = np.zeros(number, np.int64)
+    part_sizes(parts, sure, counts)
     if counts[1:].sum() == 0:
         return np.zeros_like(mask)
     if number == 2:
@@ -59,14 +61,32 @@ def main_part(mask: Labels, sure: NDArray[np.bool_], several: bool = False) -> L
     counts[0] = 0
     large = counts >= MIN_PART_SHARE * counts.max()
     if several:
-        return np.isin(parts, np.flatnonzero(large)).astype(np.uint8)
-    kept = (parts == counts.argmax()).astype(np.uint8)
+        return _parts(parts, large)
+    kept = _parts(parts, np.arange(number) == counts.argmax())
     large[counts.argmax()] = False
     if large.any():
-        near = cv2.dilate(kept, disc(max(1, round(MAX_PART_GAP * counts.max() ** 0.5))))
-        touching = np.intersect1d(np.flatnonzero(large), parts[near > 0])
-        kept |= np.isin(parts, touching)
+        near, touching = cv2.dilate(kept, disc(max(1, round(MAX_PART_GAP * counts.max() ** 0.5)))), np.zeros(number, np.int64)
+        part_sizes(parts, near, touching)
+        kept |= _parts(parts, large & (touching > 0))
     return kept
+
+
+def _connected(mask: Labels, connectivity: int) -> tuple[int, NDArray[np.int32]]:
+    """The number of a mask's connected parts and of the background, and each pixel's part (H, W); 0 is the background."""
+    import cv2
+
+    # OpenCV's function that also counts pixels takes ten times as long.
+    number, parts = cv2.connectedComponents(mask, connectivity=connectivity)
+    return number, np.asarray(parts, np.int32)
+
+
+def _parts(parts: NDArray[np.int32], chosen: NDArray[np.bool_]) -> Labels:
+    """1 for pixels of the parts that `chosen` (K,) has, else 0, of parts' numbers (H, W)."""
+    from shadowpuppet.silhouette._kernels import some_parts
+
+    out = np.empty(parts.shape, np.uint8)
+    some_parts(parts, chosen, out)
+    return out
 
 
 def bounding_window(mask: Labels, margin: int) -> Window:
@@ -79,12 +99,12 @@ def bounding_window(mask: Labels, margin: int) -> Window:
 
 def fill_small_holes(mask: Labels) -> Labels:
     """The mask with its small holes filled; background that touches the border is no hole."""
-    import cv2
+    from shadowpuppet.silhouette._kernels import part_sizes
 
-    # OpenCV's function that also counts pixels takes ten times as long.
-    _, labels = cv2.connectedComponents(1 - mask, connectivity=4)
-    parts = np.asarray(labels, np.intp)
-    filled = np.bincount(parts.ravel()) <= MAX_HOLE_SHARE * np.count_nonzero(mask)
+    number, parts = _connected(1 - mask, 4)
+    sizes = np.zeros(number, np.int64)
+    part_sizes(parts, np.ones_like(mask), sizes)
+    filled = sizes <= MAX_HOLE_SHARE * np.count_nonzero(mask)
     for border in (parts[0], parts[-1], parts[:, 0], parts[:, -1]):
         filled[border] = False
-    return mask | filled[parts]
+    return mask | _parts(parts, filled)

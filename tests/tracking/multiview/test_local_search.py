@@ -35,7 +35,7 @@ def test_a_variant_turns_one_joint():
         seen.append(poses.copy())
         return weigh(poses)
 
-    LocalSearch(SKELETON, SIGMA, 1)(np.random.default_rng(0), off(80), watched)
+    LocalSearch(SKELETON, SIGMA, 1)(np.random.default_rng(0), off(80), watched, 80)
     best = off(80).best
     assert len(seen) == 1
     assert len(seen[0]) == 40
@@ -47,7 +47,7 @@ def test_a_variant_turns_one_joint():
 
 def test_rounds_end_nearer_with_as_many_particles_best_first(rng):
     before = off()
-    after = LocalSearch(SKELETON, SIGMA, 200)(rng, before, weigh)
+    after = LocalSearch(SKELETON, SIGMA, 200)(rng, before, weigh, len(before.poses))
     assert after.poses.shape == before.poses.shape
     assert after.costs.max() < 0.2 * before.costs.min()
     assert np.all(np.diff(after.costs) >= 0)
@@ -58,7 +58,7 @@ def test_rounds_end_nearer_with_as_many_particles_best_first(rng):
 @pytest.mark.parametrize("rounds", [0, 1, 3])
 def test_nothing_gets_worse(rounds, rng):
     before = off()
-    after = LocalSearch(SKELETON, SIGMA, rounds)(rng, before, weigh)
+    after = LocalSearch(SKELETON, SIGMA, rounds)(rng, before, weigh, len(before.poses))
     assert np.all(np.sort(after.costs) <= np.sort(before.costs))
 
 

@@ -16,6 +16,7 @@ from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
+from shadowpuppet.tracking.multiview.refinement.refiner import Pass
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings, make_multiview_settings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -207,6 +208,25 @@ def test_from_six_cameras_on_there_are_fewer_particles_and_no_free_space(cameras
     monkeypatch.setattr(MultiviewObservation, "space", property(lambda _: asked.append(True)))
     of.refine(MultiviewObservation(of.views, points, (masks * 2)[:cameras]), np.zeros(len(NAMES)))
     assert bool(asked) == free_space
+
+
+@pytest.mark.parametrize(("particles", "number"), [(40, 12), (16, 8), (6, 6)])
+def test_only_the_poses_that_cost_least_after_the_coarse_iterations_go_through_the_fine_ones(particles, number):
+    of, (points, masks) = tracker(particles=particles), actor.filmed()[1][0]
+    last, observation = actor.filmed()[0][0], MultiviewObservation(of.views, points, masks)
+    spread = np.linspace(0, 0.6, particles)[:, None]
+    poses = of.body.skeleton.clamp(last + spread * np.random.default_rng(0).standard_normal((particles, len(last))))
+    refine = of.refine(observation, last)
+    assert refine is not None
+    proposed, refined = refine(poses)
+    g, (centre, pull) = of.settings.gauss_newton, of.posture_prior.quadratic(last, of.settings.gauss_newton.pull, of.settings.posture)
+    coarse = Pass(observation.cloud(g.share), g.coarse, g.coarse_tau, observation.space, g.emptiness)
+    rough, costs = of.refiner.descend(poses, coarse, centre, pull)
+    assert of.refiner.descend(rough, coarse._replace(iterations=0), centre, pull)[1] == pytest.approx(costs)
+    best = costs.argsort()[:number]
+    assert (proposed == poses[best]).all()
+    fine = Pass(observation.full, g.fine, g.fine_tau, observation.space, g.emptiness)
+    assert refined == pytest.approx(of.refiner.gauss_newton(poses, (coarse, fine), centre, pull)[best], abs=1e-4)
 
 
 @pytest.mark.parametrize("iterations", [1, 5])

@@ -21,9 +21,8 @@ class LocalSearch:
         """`sigma`: standard deviations (D,) of the noise; `rounds`: how often the best pose is varied."""
         self.skeleton, self.sigma, self.rounds = skeleton, sigma, rounds
 
-    def __call__(self, rng: np.random.Generator, particles: Particles, weigh: Weigh) -> Particles:
-        """The N best of the particles (N) and of N / 2 variants of the best one in each round."""
-        number = len(particles.poses)
+    def __call__(self, rng: np.random.Generator, particles: Particles, weigh: Weigh, number: int) -> Particles:
+        """The `number` best of the particles and of half that number of variants of the best one in each round."""
         for _ in range(self.rounds):
             tried = evaluate(self._variants(rng, particles.best, (number + 1) // 2), weigh)
             particles = best_of((particles, tried), number)

@@ -59,6 +59,9 @@ class GaussNewtonSettings:
     emptiness: NonNegative = 2.0
     """Weight of the mean squared distance by which limbs reach out of the silhouettes, with fewer than six cameras. A quarter of it if all
     films have lost detail to compression."""
+    finalists: Annotated[float, Field(gt=0, le=1)] = 0.3
+    """Share of the poses, those that cost least after the coarse iterations, that go through the fine ones, at least eight; the others are
+    dropped. 0.15 is a third faster, but made recordings are 2 % less accurate."""
     damping: Positive = 0.03
     """Initial damping, as a share of each DOF's curvature."""
     pull: NonNegative = 1e-5

@@ -35,6 +35,8 @@ MIN_POINTS, MIN_EXTENT = 50, 0.5
 MANY_CAMERAS = 6
 PARTICLES_FEW_CAMERAS, PARTICLES_MANY_CAMERAS = 40, 16
 """Default particle numbers below and from `MANY_CAMERAS` cameras."""
+FEWEST_FINALISTS = 8
+"""Least number of poses that go through the fine iterations of Gauss-Newton, if there are as many."""
 
 
 class MultiviewState(NamedTuple):
@@ -154,11 +156,11 @@ class MultiviewTracker:
             velocity = state.velocity if cycle == 0 else np.zeros_like(pose)  # the motion of a frame counts once
             poses = self.proposals(rng, selected, pose, velocity, observation.mismatch, s.cooling**cycle)
             # Step 4, refinement: move each pose by forces and moments (eqs. 32-41).
-            refined = poses if refine is None else refine(poses)
+            poses, refined = (poses, poses) if refine is None else refine(poses)
             # Step 5, weighting (eqs. 29-31); the estimate is the particle of greatest weight.
             particles = evaluate(refined, weigh)
             if s.local and s.method == "hybrid":  # not in the paper
-                particles = self.local_search(rng, better_of(particles, evaluate(poses, weigh)), weigh)
+                particles = self.local_search(rng, better_of(particles, evaluate(poses, weigh)), weigh, self.number)
             pose = particles.best if s.estimate == "best" else normalise(particles.log_weights) @ particles.poses
         return self.judge(pose, pose - state.pose, particles, observation, weigh)
 
@@ -209,7 +211,7 @@ class MultiviewTracker:
         if s.method == "particle_filter":
             return None
         if s.refinement == "forces" or s.method == "image_force":
-            return lambda poses: self.refiner.forces(poses, observation.full, s.forces)  # eqs. 32-41, on all points
+            return lambda poses: (poses, self.refiner.forces(poses, observation.full, s.forces))  # eqs. 32-41, on all points
         return self._gauss_newton(observation, last)
 
     def _gauss_newton(self, observation: MultiviewObservation, last: Array) -> Refine:
@@ -220,7 +222,14 @@ class MultiviewTracker:
         coarse = Pass(observation.cloud(g.share), g.coarse, g.coarse_tau, space, g.emptiness)
         fine = Pass(observation.full, g.fine, g.fine_tau, space, g.emptiness)
         centre, pull = self.posture_prior.quadratic(last, g.pull, s.posture)
-        return lambda poses: self.refiner.gauss_newton(poses, (coarse, fine), centre, pull, g.damping)
+        number = max(FEWEST_FINALISTS, round(g.finalists * self.number))
+
+        def refine(poses: Array) -> tuple[Array, Array]:
+            rough, costs = self.refiner.descend(poses, coarse, centre, pull, g.damping)
+            best = costs.argsort(kind="stable")[:number]
+            return poses[best], self.refiner.descend(rough[best], fine, centre, pull, g.damping)[0]
+
+        return refine
 
     def judge(self, pose: Array, velocity: Array, particles: Particles, observation: MultiviewObservation,
               weigh: Weigh) -> MultiviewState:

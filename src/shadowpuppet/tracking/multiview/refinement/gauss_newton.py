@@ -131,8 +131,8 @@ def solve_cholesky(A, b):  # pragma: no cover
 
 @kernel
 def descend(poses, centre, pull, chain, limbs, rows, groups, origin, points, numbers, damping, iterations, which, room, system,
-            spheres, space, distances, emptiness):  # pragma: no cover
-    """Move poses (N, D), in place, as `Refiner.gauss_newton` describes."""
+            spheres, space, distances, emptiness, costs):  # pragma: no cover
+    """Move poses (N, D), in place, as `Refiner.gauss_newton` describes; `costs` (N,) receives what they cost then."""
     T, screws, work, sums = room[1], room[2], room[3], room[6]
     H, A, vectors = system
     D = pull.size
@@ -178,5 +178,6 @@ def descend(poses, centre, pull, chain, limbs, rows, groups, origin, points, num
             for d in range(D):
                 move = min(max(step[d], -MAX_STEP), MAX_STEP)
                 pose[d] = min(max(best[d] + move, chain.low[d]), chain.high[d])
+        costs[n] = least
         for d in range(D):
             pose[d] = best[d]

@@ -23,8 +23,8 @@ from shadowpuppet.tracking.multiview.refinement.gauss_newton import descend
 from shadowpuppet.tracking.multiview.refinement.part_sums import SUMS, sum_costs
 from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
 
-Refine = Callable[[Array], Array]
-"""Function from poses (N, D) to refined poses (N, D)."""
+Refine = Callable[[Array], tuple[Array, Array]]
+"""Function from poses (N, D) to those of them (M, D) that are refined to the end, and these refined (M, D)."""
 
 
 class Pass(NamedTuple):
@@ -75,15 +75,21 @@ class Refiner:
             damping: initial damping of each DOF, as a share of its curvature.
         """
         poses = self.body.skeleton.checked(poses).copy()
-        centre = np.ascontiguousarray(np.atleast_2d(centre), float)
         for each in passes:
-            cloud, iterations, tau, space, emptiness = each if isinstance(each, Pass) else Pass(*each)
-            space = space or self._no_space
-            distances = np.empty((len(space.windows), len(self.spheres.radii), 4))
-            descend(poses, centre, np.asarray(pull, float), self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin,
-                    max(cloud.total, 1e-9), self._numbers(tau), damping, iterations, self._which(cloud), self._room(),
-                    self._system(), self.spheres, space, distances, emptiness)
+            poses = self.descend(poses, each if isinstance(each, Pass) else Pass(*each), centre, pull, damping)[0]
         return poses
+
+    def descend(self, poses: Array, each: Pass, centre: Array, pull: Array, damping: float = 0.03) -> tuple[Array, Array]:
+        """Poses (N, D) refined by one pass of `gauss_newton`, whose arguments these are, and what they cost then (N,), m^2."""
+        poses = self.body.skeleton.checked(poses).copy()
+        centre, pull = np.ascontiguousarray(np.atleast_2d(centre), float), np.asarray(pull, float)
+        cloud, iterations, tau, space, emptiness = each
+        space, costs = space or self._no_space, np.empty(len(poses))
+        distances = np.empty((len(space.windows), len(self.spheres.radii), 4))
+        descend(poses, centre, pull, self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin, max(cloud.total, 1e-9),
+                self._numbers(tau), damping, iterations, self._which(cloud), self._room(), self._system(), self.spheres, space,
+                distances, emptiness, costs)
+        return poses, costs
 
     def forces(self, poses: Array, cloud: Cloud, settings: ForceSettings) -> Array:
         """Poses (N, D) moved by simulated force and moment (eqs. 32-41), within limits, until these balance: first with the coarse, then
