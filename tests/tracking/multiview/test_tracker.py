@@ -223,7 +223,7 @@ def test_only_the_poses_that_cost_least_after_the_coarse_iterations_go_through_t
     coarse = Pass(observation.cloud(g.share), g.coarse, g.coarse_tau, observation.space, g.emptiness)
     rough, costs = of.refiner.descend(poses, coarse, centre, pull)
     assert of.refiner.descend(rough, coarse._replace(iterations=0), centre, pull)[1] == pytest.approx(costs)
-    best = costs.argsort()[:number]
+    best = costs.argsort()[:number] if number < particles else np.arange(particles)
     assert (proposed == poses[best]).all()
     fine = Pass(observation.full, g.fine, g.fine_tau, observation.space, g.emptiness)
     assert refined == pytest.approx(of.refiner.gauss_newton(poses, (coarse, fine), centre, pull)[best], abs=1e-4)

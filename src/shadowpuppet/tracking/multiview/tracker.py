@@ -226,7 +226,7 @@ class MultiviewTracker:
 
         def refine(poses: Array) -> tuple[Array, Array]:
             rough, costs = self.refiner.descend(poses, coarse, centre, pull, g.damping)
-            best = costs.argsort(kind="stable")[:number]
+            best = costs.argsort(kind="stable")[:number] if number < len(poses) else np.arange(len(poses))
             return poses[best], self.refiner.descend(rough[best], fine, centre, pull, g.damping)[0]
 
         return refine
