@@ -226,6 +226,7 @@ class MultiviewTracker:
 
         def refine(poses: Array) -> tuple[Array, Array]:
             rough, costs = self.refiner.descend(poses, coarse, centre, pull, g.damping)
+            # where all go on they keep their order: what is drawn at random later goes by it
             best = costs.argsort(kind="stable")[:number] if number < len(poses) else np.arange(len(poses))
             return poses[best], self.refiner.descend(rough[best], fine, centre, pull, g.damping)[0]
 
