@@ -16,6 +16,7 @@ from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.motion.table import read_raw
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.limbs import LIMBS
+from shadowpuppet.pipeline import frame_process
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.pipeline.prepare import MULTIVIEW, look_at
@@ -175,6 +176,18 @@ def test_nobody_at_all_is_refused(tmp_path):
     assert look_at(recording, Options(masks=True)).refusal is not None
 
 
+def test_silhouettes_from_another_process_change_nothing(recording, whole, tmp_path, monkeypatch):
+    started = []
+    monkeypatch.setattr(frame_process.Task, "is_long", True)
+    monkeypatch.setattr(frame_process, "usable_cores", lambda: 2)
+    monkeypatch.setattr(frame_process, "_received", lambda packed, original=frame_process._received: started.append(1) or original(packed))
+    other = track(recording, tmp_path / "run", Options(overlay=True))
+    assert started
+    assert (other.folder / "joints.csv").read_bytes() == (whole.folder / "joints.csv").read_bytes()
+    drawn = [np.array(made.images(each.folder / "overlay.mp4"), int) for each in (other, whole)]
+    assert np.abs(drawn[0] - drawn[1]).max() < 20  # the codec's threads
+
+
 def test_a_camera_that_freezes_is_set_aside_and_named(recording, tmp_path, monkeypatch):
     def frozen(*arguments, **named):
         held = None
@@ -182,7 +195,7 @@ def test_a_camera_that_freezes_is_set_aside_and_named(recording, tmp_path, monke
             held = seen.masks[1] if n < 3 else held
             yield seen._replace(masks=(seen.masks[0], held, *seen.masks[2:]))
 
-    monkeypatch.setattr("shadowpuppet.pipeline.track.read_frames", frozen)
+    monkeypatch.setattr("shadowpuppet.pipeline.frame_process.read_frames", frozen)
     with pytest.warns(ShadowPuppetWarning, match="left out for a time \\(camera 'cam2', frozen from"):
         done = track(recording, tmp_path / "run")
     (found,) = done.metrics["set_aside"]

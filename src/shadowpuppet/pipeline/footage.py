@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +60,10 @@ class Footage:
     def film(self) -> FrameSource:
         """The film; iterating over it gives its frames."""
         return open_frames(self.view.video, size=self.camera.size, rate=self.recording.rate)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs, which opens the film itself."""
+        return {name: value for name, value in self.__dict__.items() if name != "film"}
 
     def frames(self, ready: bool, strict: bool = True, wanted: Wanted = lambda _: True) -> Iterator[CameraFrame]:
         """The film's frames from the recording's begin on; with `ready`, the ready silhouettes too. `wanted`: whether a frame is, asked

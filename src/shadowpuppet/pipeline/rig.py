@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, Seen
@@ -24,6 +24,9 @@ from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.video import Image
 from shadowpuppet.video.frames import ASSUMED_RATE
+
+if TYPE_CHECKING:
+    from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 
 NEAR = 0.55
 """Largest offset of a frame from the time of its set, over the sets' interval: half, and a little for jittering clocks."""
@@ -65,6 +68,10 @@ class FrameSet(NamedTuple):
     """Images that fit the masks, in the light of the empty scene (`Segmented.image`); empty: not known."""
     shadows: tuple[Mask | None, ...] = ()
     """As in `Seen`."""
+    points: SurfacePoints | None = None
+    """Surface points of the visual hull of `masks`; None: not computed."""
+    carving: float = 0.0
+    """Seconds of computing them."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from shadowpuppet.io.people import person_folder
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter, write_metrics
 from shadowpuppet.motion.motion import BLANK, Motion, MotionBuilder, MotionFrame
+from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
@@ -41,7 +42,7 @@ from shadowpuppet.pipeline.progress import (
     warn_of_set_aside,
     write_beside,
 )
-from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig, read_frames
+from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, floor_entry, joint_names, motion_frame
@@ -231,8 +232,8 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
     try:
         with ExitStack() as stack:
             overlay = stack.enter_context(write_frames(writer.folder / "overlay.mp4", rate / options.every)) if options.overlay else None
-            segment = [silhouettes.following() for silhouettes in survey.silhouettes]
-            frames = stack.enter_context(closing(read_frames(survey.rig, segment, ready=options.masks, every=options.every)))
+            task = Task(survey.rig, survey.silhouettes, options.masks, options.every, images=options.overlay, corrected=False)
+            frames = stack.enter_context(closing(frames_beside(task)))
             if cache is not None:
                 frames = stack.enter_context(closing(cache.frames(frames, options)))
             frames = (seen._replace(masks=watch(seen.time, seen.masks, seen.own)) for seen in frames)

@@ -54,6 +54,36 @@ def contrast(planes, mean, seen, out):
 
 
 @compiled(nogil=True)
+def inside(contrast, inner, mask, deep, within):
+    """Contrast, float32 (H, W), in `deep` where `inner` is 1, and in `within` where `mask` is 1, both uint8 (H, W); else 0."""
+    for y in range(contrast.shape[0]):
+        for x in range(contrast.shape[1]):
+            deep[y, x] = contrast[y, x] * np.float32(inner[y, x])
+            within[y, x] = contrast[y, x] * np.float32(mask[y, x])
+
+
+@compiled(nogil=True)
+def outlined(contrast, inner, wide, total, number, greatest, least, shares, found, full):
+    """The pixels that are the person's by their contrast: `found` (H, W), and in `full` those that are so even if they stick out alone.
+
+    contrast: float32 (H, W); inner, wide: 1 well inside the person, and on or next to them, uint8; total, number: sum of the contrasts of
+    inner pixels around each pixel, and their number; greatest: greatest contrast near it, float32. least: least contrast of an outline.
+    shares: of the contrast around a pixel, at the outline, of bled colour, of full contrast; and the weight of the greatest against the
+    mean in that contrast, which is the greatest alone if no inner pixel is near.
+    """
+    at_outline, bled, whole, weight = shares
+    for y in range(contrast.shape[0]):
+        for x in range(contrast.shape[1]):
+            peak, here = greatest[y, x], contrast[y, x]
+            mean = min(total[y, x] / max(number[y, x], np.float32(1)), peak) if number[y, x] > np.float32(0.5) else peak
+            around = weight * peak + (np.float32(1) - weight) * mean
+            core = inner[y, x] > 0 and here >= min(bled * around, np.float32(2) * least)
+            rim = wide[y, x] > 0 and here >= max(at_outline * around, least)
+            found[y, x] = np.uint8(core or rim)
+            full[y, x] = np.uint8((core or rim) and here > whole * around)
+
+
+@compiled(nogil=True)
 def part_sizes(parts, counted, sizes):
     """Add to `sizes` (K,) the number of pixels of each part, of those that `counted` (H, W) has; parts: their numbers, int32 (H, W)."""
     for y in range(parts.shape[0]):

@@ -21,11 +21,14 @@ OUTLINE_SHARE = 0.5
 SURROUND_MARGIN = 2
 """Pixels by which the surroundings of a pixel reach beyond the width of the outline."""
 PEAK_WEIGHT = 0.3
-"""Weight of the greatest contrast against the mean: limbs as thin as the blur hardly reach their full contrast."""
+"""Weight of the greatest contrast against the mean: limbs as thin as the blur hardly reach their full contrast. If the greatest were always
+used, an arm next to a brighter shirt would count as the shirt's blurred outline."""
 BLEED_SHARE = 0.3
 """Share of the surrounding contrast below which a pixel inside is colour bled by compression over a narrow gap."""
 FULL_SHARE = 0.7
 """Share of the surrounding contrast from which on a pixel stays even if it sticks out alone: a fingertip."""
+SHARES = tuple(map(np.float32, (OUTLINE_SHARE, BLEED_SHARE, FULL_SHARE, PEAK_WEIGHT)))
+"""These shares in single precision, as kernels take them."""
 OUTWARD_REACH = 1
 """Pixels by which the outline may move outward, into rims that were taken for shadow."""
 SHARP_WIDTH = 2
@@ -56,27 +59,18 @@ def at_half_contrast(mask: Labels, contrast: Contrast, outline: EdgeProfile) -> 
     """
     import cv2
 
+    from shadowpuppet.silhouette._kernels import inside, outlined
+
     inner = np.asarray(cv2.erode(mask, disc(outline.width), borderValue=1), np.uint8)
-    around = _around(mask, inner, contrast, outline.width)
-    core = (inner > 0) & (contrast >= np.minimum(BLEED_SHARE * around, 2 * outline.least))
-    rim = (cv2.dilate(mask, disc(OUTWARD_REACH)) > 0) & (contrast >= np.maximum(OUTLINE_SHARE * around, outline.least))
-    found = (core | rim).astype(np.uint8)
-    return np.asarray(cv2.medianBlur(found, 3), np.uint8) | (found & (contrast > FULL_SHARE * around))
-
-
-def _around(mask: Labels, inner: Labels, contrast: Contrast, width: int) -> Contrast:
-    """Contrast (H, W) of the person near each pixel: mean over the mask's inner part, mixed with the greatest by `PEAK_WEIGHT`; the
-    greatest alone if no inner part is near.
-
-    If the greatest were always used, an arm next to a brighter shirt would count as the shirt's blurred outline.
-    """
-    import cv2
-
-    side = 2 * (width + SURROUND_MARGIN) + 1
-    total, count = (cv2.boxFilter(values, cv2.CV_32F, (side, side), normalize=False) for values in (contrast * inner, inner))
-    greatest = cv2.dilate(contrast * mask, np.ones((2 * width + 1, 2 * width + 1), np.uint8))
-    mean = np.where(count > 0.5, np.minimum(total / np.maximum(count, 1), greatest), greatest)
-    return np.float32(PEAK_WEIGHT) * greatest + np.float32(1 - PEAK_WEIGHT) * mean
+    deep, within = np.empty_like(contrast), np.empty_like(contrast)
+    inside(contrast, inner, mask, deep, within)
+    side = 2 * (outline.width + SURROUND_MARGIN) + 1
+    total, number = (cv2.boxFilter(values, cv2.CV_32F, (side, side), normalize=False) for values in (deep, inner))
+    greatest = cv2.dilate(within, np.ones((2 * outline.width + 1,) * 2, np.uint8))
+    found, full = np.empty_like(mask), np.empty_like(mask)
+    wide, least = cv2.dilate(mask, disc(OUTWARD_REACH)), np.float32(outline.least)
+    outlined(contrast, inner, wide, total, number, greatest, least, SHARES, found, full)
+    return np.asarray(cv2.medianBlur(found, 3), np.uint8) | full
 
 
 def outline_width(people: Iterable[tuple[Labels, Contrast]]) -> int:

@@ -22,7 +22,7 @@ from shadowpuppet.io.people import person_folders, read_places
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import CompleteRun
 from shadowpuppet.motion.motion import MotionFrame
-from shadowpuppet.pipeline import progress
+from shadowpuppet.pipeline import frame_process, progress
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.people.census import people_in, sampled_sets, take_census
 from shadowpuppet.pipeline.people.group import first_people
@@ -153,10 +153,15 @@ def test_a_run_killed_anywhere_goes_on_to_the_same_result(run, tracked, frames):
     assert len(made.images(left / "overlay.mp4")) == FRAMES
 
 
-@pytest.mark.parametrize("threads", ["1", "7"])
-def test_cores_change_nothing(run, tracked, tmp_path, monkeypatch, threads):
+@pytest.mark.parametrize(("threads", "processes"), [("1", 0), ("7", 0), ("7", 1)])
+def test_cores_change_nothing(run, tracked, tmp_path, monkeypatch, threads, processes):
     monkeypatch.setenv("SHADOWPUPPET_THREADS", threads)
+    monkeypatch.setattr(frame_process.Task, "is_long", processes > 0)
+    monkeypatch.setattr(frame_process, "usable_cores", lambda: 2)
+    started = []
+    monkeypatch.setattr(frame_process, "_received", lambda packed, original=frame_process._received: started.append(1) or original(packed))
     other = tracked(tmp_path / "run")
+    assert len(started) == processes
     for name in ("people.csv", "person-1/motion.npz", "person-2/joints.csv"):
         assert (other.folder / name).read_bytes() == (run.folder / name).read_bytes(), name
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -25,6 +26,7 @@ from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import RunWriter, write_metrics
 from shadowpuppet.motion.motion import JointTable, Motion, MotionFrame
 from shadowpuppet.motion.synchronization import at_common_times
+from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.look import RigLook, Survey
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.overlay_video import overlay_of_people
@@ -206,8 +208,9 @@ class PeopleRun:
         write_beside(self.folder, look, self.rig)
         places = stack.enter_context(open_places(self.folder, None if carried is None else carried.size))
         overlay = stack.enter_context(write_frames(self.folder / "overlay.mp4", rate / options.every)) if options.overlay else None
-        segment = [silhouettes.following() for silhouettes in survey.silhouettes]
-        frames = stack.enter_context(closing(read_frames(self.rig, segment, ready=options.masks, every=options.every)))
+        task = Task(self.rig, survey.silhouettes, options.masks, options.every, images=options.overlay, corrected=options.appearance,
+                    hull=group.hull)
+        frames = stack.enter_context(closing(frames_beside(task)))
         clear = [] if carried is None else carried.clear.tolist()
         earlier = iter(self._earlier(group, carried, stack))
 
@@ -224,9 +227,12 @@ class PeopleRun:
                 if (known := next(earlier, None)) is not None:
                     judged(seen, *known)
                     continue
-                timer.add(decode=seen.decoding, segment=seen.segmenting)
+                timer.add(decode=seen.decoding, segment=seen.segmenting, hull=seen.carving)
                 with timer.time("hull"):
-                    points, shown = group.hull.points(masks), Seen(tuple(masks), seen.shadows)
+                    points = seen.points
+                    if points is None or not all(map(operator.is_, masks, seen.masks)):
+                        points = group.hull.points(masks)
+                    shown = Seen(tuple(masks), seen.shadows)
                 with timer.time("track"):
                     if not begun and len(points.points):
                         begun = True

@@ -111,7 +111,7 @@ class MultiviewObservation:
 def half_size(mask: Mask | None) -> Mask:
     """Every second pixel of every second row of a mask (H, W)."""
     assert mask is not None
-    return mask[::2, ::2]
+    return np.ascontiguousarray(mask[::2, ::2])
 
 
 def _without(surface: SurfacePoints, views: BodyInViews, left_out: Sequence[Mask | None]) -> SurfacePoints:

@@ -107,6 +107,16 @@ class Division:
         """Distances (P,), metres, of the surface points from each body."""
         return {n: self.known[n] if n in self.known else one.distances(self.points.points) for n, one in self.drawn.items()}
 
+    @cached_property
+    def near(self) -> dict[int, tuple[Mask, ...]]:
+        """Pixels (H / 2, W / 2) of each body, and beside it, in each camera."""
+        return {n: pixels_near(one) for n, one in self.drawn.items()} if len(self.drawn) > 1 else {}
+
+    @cached_property
+    def small(self) -> list[Mask | None]:
+        """The silhouettes at half size."""
+        return [None if mask is None else half_size(mask) for mask in self.masks]
+
     def others(self, n: int) -> list[int]:
         """Numbers of the other people whose bodies explain something."""
         return [m for m in self.drawn if m != n and m not in self.lost]
@@ -117,7 +127,8 @@ class Division:
 
     def of(self, n: int) -> tuple[SurfacePoints, list[Mask | None]]:
         """A person's surface points, and the pixels (H / 2, W / 2) of each camera that say nothing of them."""
-        return self.points_of(n), ignored_pixels(self.drawn[n], [self.drawn[m] for m in self.others(n)], self.masks)
+        others = [(self.drawn[m].masks, self.near[m]) for m in self.others(n)]
+        return self.points_of(n), _ignored(self.drawn[n].masks, others, self.small)
 
     def share(self, n: int) -> tuple[SurfacePoints, list[Mask | None], list[Mask | None]]:
         """A person's surface points, silhouettes (H, W), one per camera, and the pixels (H / 2, W / 2) of each that say nothing of them."""
@@ -136,19 +147,29 @@ def picked(surface: SurfacePoints, which: NDArray[np.bool_]) -> SurfacePoints:
     return SurfacePoints(points[which], normals[which], weights[which], cameras[which])
 
 
+def pixels_near(drawn: Drawn) -> tuple[Mask, ...]:
+    """Pixels (H, W) of a body in pictures of half the size, and beside it, one mask per camera; of those that do not show it, none."""
+    return tuple(near(mask) if mask.any() else mask for mask in drawn.masks)
+
+
 def ignored_pixels(drawn: Drawn, others: Sequence[Drawn], masks: Sequence[Mask | None]) -> list[Mask | None]:
-    """For each camera the pixels (H, W), at half size, that say nothing of a person: where other people are drawn, or what is silhouette
-    far from this one."""
+    """For each camera the pixels (H / 2, W / 2) that say nothing of a person: where other people are drawn, or what is silhouette far from
+    this one. `masks`: silhouettes (H, W)."""
+    small = [None if mask is None else half_size(mask) for mask in masks]
+    return _ignored(drawn.masks, [(other.masks, pixels_near(other)) for other in others], small)
+
+
+def _ignored(drawn: Sequence[Mask], others: Sequence[tuple[Sequence[Mask], Sequence[Mask]]],
+             small: Sequence[Mask | None]) -> list[Mask | None]:
+    """`ignored_pixels` of masks at half size: the body, other bodies with the pixels near them, and the silhouettes."""
     ignored = list[Mask | None]()
-    for n, mask in enumerate(masks):
-        if mask is None:
+    for n, silhouette in enumerate(small):
+        if silhouette is None:
             ignored.append(None)
             continue
-        small, out = half_size(mask), ~_around(drawn.masks[n])
-        out &= small
-        for other in others:
-            if other.masks[n].any():
-                out |= near(other.masks[n]) & (small | other.masks[n])
+        out = silhouette & ~_around(drawn[n])
+        for body, beside in others:
+            out |= beside[n] & (silhouette | body[n])
         ignored.append(out)
     return ignored
 
@@ -171,9 +192,18 @@ def own_masks(drawn: Drawn, masks: Sequence[Mask | None], ignored: Sequence[Mask
         if mask is None or out is None:
             found.append(None)
             continue
-        wide = (out & ~body).repeat(2, 0).repeat(2, 1)[: mask.shape[0], : mask.shape[1]]
-        found.append(mask & ~wide)
+        own = np.empty_like(mask)
+        _own_pixels(mask, out & ~body, own)
+        found.append(own)
     return found
+
+
+@kernel
+def _own_pixels(mask, out, own):  # pragma: no cover
+    """Fill `own` (H, W) with a mask (H, W) without pixels (H / 2, W / 2)."""
+    for y in range(mask.shape[0]):
+        for x in range(mask.shape[1]):
+            own[y, x] = mask[y, x] and not out[y // 2, x // 2]
 
 
 @kernel

@@ -101,13 +101,18 @@ def _limbs(pixels: NDArray[np.int64], lengths: Array, shadow: Mask, pitch: int) 
     """
     import cv2
 
-    found = np.zeros(shadow.shape, np.uint8)
-    found[pixels[:, 1], pixels[:, 0]] = 1
-    around = np.asarray(cv2.dilate(found, np.ones((pitch + 1, pitch + 1), np.uint8)), np.uint8) & shadow.view(np.uint8)
+    reach, out = pitch, np.zeros_like(shadow)  # more than the dilation below has
+    window = tuple(slice(max(low - reach, 0), high + reach + 1) for low, high in zip(pixels.min(0)[::-1], pixels.max(0)[::-1]))
+    x, y = (pixels - [window[1].start, window[0].start]).T
+    near = np.ascontiguousarray(shadow[window]).view(np.uint8)
+    found = np.zeros_like(near)
+    found[y, x] = 1
+    around = np.asarray(cv2.dilate(found, np.ones((pitch + 1, pitch + 1), np.uint8)), np.uint8) & near
     firm = cv2.morphologyEx(around, cv2.MORPH_OPEN, disc(round(THINNEST / PITCH * pitch)))
     number, labels = cv2.connectedComponents(firm, connectivity=4)
-    parts, (x, y) = np.asarray(labels, np.intp), pixels[lengths >= LIMB_LENGTH].T
+    parts, long = np.asarray(labels, np.int32), lengths >= LIMB_LENGTH
     limb = np.zeros(number, bool)
-    limb[parts[y, x]] = True
+    limb[parts[y[long], x[long]]] = True
     limb[0] = False
-    return limb[parts]
+    out[window] = limb[parts]
+    return out
