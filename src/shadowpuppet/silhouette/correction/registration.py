@@ -41,6 +41,9 @@ LEAST_SHOWN = 0.05
 """Least share of the points that people leave for a frame to show the scene."""
 BETTER = 0.6
 """Greatest such difference under a movement, over that without it: compression leaves 0.65 under a movement that is none."""
+WELL = 0.25
+"""Share of the points, those that fit best, which must fit better under a movement, too: without one, what people and their shadows leave of
+a scene fits best as it is, however much of the rest a movement explains by chance."""
 PIECE, BENT = 64, 0.03
 """Greatest number of pixels in a row over which a movement is taken for linear, and its greatest error by that, pixels."""
 ROUGH, SETTLED = 0.3, 0.05
@@ -97,7 +100,8 @@ class Registration:
         pixel = 2 / self.scene.shape[1]
         found = refined(coarse, small, searched_shift(coarse, small), True, ROUGH * pixel)
         found = refined(fine, picture, found, False, SETTLED * pixel)
-        better = _unlike(fine, compared(fine, picture, found)) < BETTER * min(_unlike(fine, compared(fine, picture, NONE)), 1)
+        moved, still = (np.abs(compared(fine, picture, each)) for each in (found, NONE))
+        better = median_of(moved) < BETTER * min(median_of(still), fine.typical) and np.quantile(moved, WELL) < np.quantile(still, WELL)
         return found if better and self.pixels(found) >= STILL else None
 
     def _moved(self, points: Points, picture: Floats, margin: float = 1.0) -> bool:
@@ -196,11 +200,6 @@ def _halved(picture: np.ndarray) -> np.ndarray:
     import cv2
 
     return np.asarray(cv2.resize(picture, (picture.shape[1] // 2, picture.shape[0] // 2), interpolation=cv2.INTER_AREA))
-
-
-def _unlike(points: Points, difference: Floats) -> float:
-    """Median of the differences (N,) of points over that of their values: near 0 for pictures that match, 1.4 for strangers."""
-    return median_of(np.abs(difference)) / points.typical
 
 
 def _about(people: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:
