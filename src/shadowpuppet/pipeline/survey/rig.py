@@ -28,6 +28,8 @@ from shadowpuppet.tracking.people.views import View, views_of
 
 SILHOUETTES_OR_CAMERAS = "silhouettes do not fit together: film the empty scene, or calibrate"
 """Ten words on an agreement that an empty scene recovered from the film may have spoiled."""
+COMPARED = 3
+"""Number of views of a person in which each camera is compared with the others, where several people are seen."""
 ENOUGH = 3
 """Number of cameras that show all of the person, with which it does no harm that others do not."""
 RATES, LENGTHS = 0.02, 0.1
@@ -89,11 +91,23 @@ def _agreement_of_people(rig: Rig, census: Census, first: FirstSeconds) -> Agree
         rows += [row for row in each if sum(mask is not None for mask in row) > 1]
     if 2 * len(rows) < SETS_COMPARED:  # one person in a calibration of the wrong unit may be taken for several
         return _agreement_of_one(rig, first)
-    found = agreement(rig.cameras, rows)
+    found = agreement(rig.cameras, _most_shown(rows))
     if None not in found.apart:
         return found
     together = _agreement_of_one(rig, first)
     return replace(found, apart=tuple(whole if one is None else one for one, whole in zip(found.apart, together.apart, strict=True)))
+
+
+def _most_shown(rows: Sequence[View]) -> list[View]:
+    """Views that show each camera's people in `COMPARED` of them, if there are as many, and in most cameras: a person whom two show tells
+    whether these two agree, not which of them is wrong."""
+    taken, number = list[View](), np.zeros(len(rows[0]), int)
+    for row in sorted(rows, key=lambda row: -sum(mask is not None for mask in row)):
+        shown = np.array([mask is not None for mask in row])
+        if (number[shown] < COMPARED).any():
+            taken.append(row)
+            number += shown
+    return taken
 
 
 def _shows_person(film: FilmSurvey) -> bool:
