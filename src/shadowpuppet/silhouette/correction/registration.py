@@ -42,8 +42,8 @@ LEAST_SHOWN = 0.05
 BETTER = 0.6
 """Greatest such difference under a movement, over that without it: compression leaves 0.65 under a movement that is none."""
 WELL = 0.25
-"""Share of the points, those that fit best, which must fit better under a movement, too: without one, what people and their shadows leave of
-a scene fits best as it is, however much of the rest a movement explains by chance."""
+"""Share of the points, those that fit best, which must fit better under a movement, too: of a camera that stands still, what people and
+their shadows leave of the scene fits best as it is, however much of the rest a movement explains by chance."""
 PIECE, BENT = 64, 0.03
 """Greatest number of pixels in a row over which a movement is taken for linear, and its greatest error by that, pixels."""
 ROUGH, SETTLED = 0.3, 0.05
