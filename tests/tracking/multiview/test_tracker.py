@@ -210,9 +210,12 @@ def test_from_six_cameras_on_there_are_fewer_particles_and_no_free_space(cameras
     assert bool(asked) == free_space
 
 
-@pytest.mark.parametrize(("particles", "number"), [(40, 12), (16, 8), (6, 6)])
-def test_only_the_poses_that_cost_least_after_the_coarse_iterations_go_through_the_fine_ones(particles, number):
-    of, (points, masks) = tracker(particles=particles), actor.filmed()[1][0]
+@pytest.mark.parametrize(("cameras", "particles", "number"), [(5, 40, 12), (5, 16, 8), (5, 6, 6), (4, 40, 40)])
+def test_only_the_poses_that_cost_least_after_the_coarse_iterations_go_through_the_fine_ones(cameras, particles, number):
+    views = (actor.cameras() * 2)[:cameras]
+    of = MultiviewTracker(actor.body(), views, make_multiview_settings("default", {"particles": particles}))
+    points, masks = actor.filmed()[1][0]
+    masks = (masks * 2)[:cameras]
     last, observation = actor.filmed()[0][0], MultiviewObservation(of.views, points, masks)
     spread = np.linspace(0, 0.6, particles)[:, None]
     poses = of.body.skeleton.clamp(last + spread * np.random.default_rng(0).standard_normal((particles, len(last))))

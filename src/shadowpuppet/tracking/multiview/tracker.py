@@ -35,6 +35,8 @@ MIN_POINTS, MIN_EXTENT = 50, 0.5
 MANY_CAMERAS = 6
 PARTICLES_FEW_CAMERAS, PARTICLES_MANY_CAMERAS = 40, 16
 """Default particle numbers below and from `MANY_CAMERAS` cameras."""
+FEW_CAMERAS = 4
+"""Number of cameras up to which all poses go through the fine iterations of Gauss-Newton: they leave more of them possible."""
 FEWEST_FINALISTS = 8
 """Least number of poses that go through the fine iterations of Gauss-Newton, if there are as many."""
 
@@ -222,7 +224,8 @@ class MultiviewTracker:
         coarse = Pass(observation.cloud(g.share), g.coarse, g.coarse_tau, space, g.emptiness)
         fine = Pass(observation.full, g.fine, g.fine_tau, space, g.emptiness)
         centre, pull = self.posture_prior.quadratic(last, g.pull, s.posture)
-        number = max(FEWEST_FINALISTS, round(g.finalists * self.number))
+        share = g.finalists if len(self.cameras) > FEW_CAMERAS else 1.0
+        number = max(FEWEST_FINALISTS, round(share * self.number))
 
         def refine(poses: Array) -> tuple[Array, Array]:
             rough, costs = self.refiner.descend(poses, coarse, centre, pull, g.damping)
