@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.colour_codes import Codes, colour_codes
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
@@ -20,6 +21,7 @@ from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import fit_monocular
 from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.pipeline.survey.camera import survey_camera
+from shadowpuppet.tracking.monocular.arm_colours import ColourCounts
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
@@ -40,6 +42,8 @@ class Case:
     times: Array
     masks: list[Mask]
     """For the tracker."""
+    codes: list[Codes | None]
+    """Their colours."""
     truth: JointTable
 
     @classmethod
@@ -53,9 +57,9 @@ class Case:
         if not references:
             recording = replace(footage.recording, references=())
             survey = replace(survey, rig=Rig(recording, (replace(footage, recording=recording),)))
-        frames = [(frame.time, survey.silhouettes[0](frame)) for frame in footage.frames(masks)]
-        times, tracked = np.array([time for time, _ in frames]), [mask for _, mask in frames]
-        return cls(path.name, survey, times, tracked, read_joints(footage.recording.truth))
+        frames = [(frame.time, survey.silhouettes[0].segmented(frame)) for frame in footage.frames(masks)]
+        times, tracked = np.array([time for time, _ in frames]), [found.mask for _, found in frames]
+        return cls(path.name, survey, times, tracked, [colour_codes(found.image) for _, found in frames], read_joints(footage.recording.truth))
 
     @property
     def camera(self) -> Camera:
@@ -71,9 +75,9 @@ class Case:
         frame."""
         picture = person.picture(self.camera, settings.body)
         tracker = MonocularTracker(picture, settings)
-        poses, costs, spent = _pass(tracker, rng, self.masks)
+        poses, costs, spent, colours = _pass(tracker, rng, self.masks, self.codes)
         if settings.both_ways and picture.body.hem is not None:
-            backward, others, more = _pass(tracker, rng, self.masks[::-1])
+            backward, others, more, _ = _pass(tracker, rng, self.masks[::-1], self.codes[::-1], colours)
             names = picture.body.skeleton.dof_names
             near = near_profile(names, poses) | near_profile(names, backward[::-1])
             share = backward_share(self.times, costs, others[::-1], near, pixel_scale(self.camera.size))
@@ -95,13 +99,16 @@ class Case:
                       "aligned": aligned["aligned_mean_mm"], "jitter": jitter}
 
 
-def _pass(tracker: MonocularTracker, rng: np.random.Generator, masks: list[Mask]) -> tuple[Array, Array, float]:
-    """Poses (T, D) and costs (T,) of masks tracked in their order, and the processor time (s) after the first."""
-    states = [tracker.start(rng, masks[0])]
+def _pass(tracker: MonocularTracker, rng: np.random.Generator, masks: list[Mask], codes: list[Codes | None],
+          colours: ColourCounts | None = None) -> tuple[Array, Array, float, ColourCounts | None]:
+    """Poses (T, D) and costs (T,) of masks tracked in their order, the processor time (s) after the first, and the colours of the person's
+    arms; `colours`: what is known of them before."""
+    states = [tracker.start(rng, masks[0])._replace(colours=colours)]
     start = time.process_time()  # what else the machine does is not counted
-    for mask in masks[1:]:
-        states.append(tracker.step(rng, states[-1], mask))
-    return np.array([state.pose for state in states]), np.array([state.cost for state in states]), time.process_time() - start
+    for mask, seen in zip(masks[1:], codes[1:]):
+        states.append(tracker.step(rng, states[-1], mask, codes=seen))
+    spent = time.process_time() - start
+    return np.array([state.pose for state in states]), np.array([state.cost for state in states]), spent, states[-1].colours
 
 
 def means(runs: list[dict[str, float]]) -> dict[str, float]:

@@ -44,6 +44,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "liu2011, stratified": {"preset": "liu2011", "tracker": {"resampling": "stratified"}},
     "exact masks": {"masks": True},
     "cardbox": {"tracker": {"body": "cardbox"}},
+    "no colours of arms": {"tracker": {"arm_colours": False}},
     "forward only": {"tracker": {"both_ways": False}},
     "no exploring": {"tracker": {"explore": 0}},
     "explore 2000": {"tracker": {"explore": 2000}},

@@ -14,6 +14,7 @@ import numpy as np
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.colour_codes import Codes
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.live.display.view import Angle, View
@@ -109,6 +110,8 @@ class LiveSession(ABC):
         """Which of several cameras are set aside."""
         self._own: Masks = ()
         """Masks (H, W) as each of several cameras has them, before others add to them."""
+        self._codes: tuple[Codes | None, ...] = ()
+        """`FrameSet.codes` of the last pictures."""
         self._measured: Callable[[], Any] = lambda: None
 
     @property
@@ -228,7 +231,7 @@ class LiveSession(ABC):
     def _track(self, shot: Any, images: Any) -> Outcome:
         assert self.subject is not None
         masks = self._masks(shot, images)
-        observation = self.subject.observe(masks if self._watch is None else self._watch(shot.captured, masks, self._own))
+        observation = self.subject.observe(masks if self._watch is None else self._watch(shot.captured, masks, self._own), self._codes)
         self._state = self.subject.next_state(self.rng, self._state, observation)
         if self._watch is not None:
             self._watch.tracked(self.subject.drawn(self._state))

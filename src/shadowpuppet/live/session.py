@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.person import Person
@@ -224,7 +225,9 @@ class Session(LiveSession):
         segment = self._segment if self.phase == "tracking" else clean
         if segment is None:
             return ()
-        return (segment(CameraFrame(shot.captured, images[0], None)).mask,)
+        found = segment(CameraFrame(shot.captured, images[0], None))
+        self._codes = (colour_codes(found.image),)
+        return (found.mask,)
 
     def _forget_time(self) -> None:
         if self.phase == "learning":

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.body.upper_body import TWIST
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import overlay_frame
+from shadowpuppet.camera.colour_codes import Codes
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution, RecordingError, SilhouetteError, TrackingError
@@ -35,6 +36,7 @@ from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.tracking.doubt.monocular import Before, MonocularDoubt
 from shadowpuppet.tracking.doubt.steps import Trail
+from shadowpuppet.tracking.monocular.arm_colours import ColourCounts
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
@@ -75,6 +77,15 @@ ELSEWHERE = 0.25
 """Share of the moments that do not fit the person's place from which that is a doubt."""
 
 
+class ColouredMask(NamedTuple):
+    """One camera's frame."""
+
+    mask: Mask
+    """The silhouette (H, W)."""
+    codes: Codes | None
+    """Coarse colours; None: not known."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MonocularSubject(TrackedSubject):
     """A fitted person seen by one camera, and the tracker."""
@@ -82,7 +93,9 @@ class MonocularSubject(TrackedSubject):
     fit: SizeFit
     """Sizes and place, and how they were found."""
     tracker: MonocularTracker
-    state_types = (State, Particles, Unexplained, Before, Trail)
+    colours: ColourCounts | None = None
+    """What is known of the arms' colours before the first frame."""
+    state_types = (State, Particles, Unexplained, Before, Trail, ColourCounts)
 
     @classmethod
     def of(cls, fit: SizeFit, camera: Camera, settings: MonocularSettings, source: str, rate: float) -> MonocularSubject:
@@ -118,17 +131,21 @@ class MonocularSubject(TrackedSubject):
         """How the camera sees the body."""
         return self.tracker.picture
 
-    def observe(self, masks: Sequence[Mask | None]) -> Mask:
-        """The camera's mask (H, W)."""
+    def observe(self, masks: Sequence[Mask | None], codes: Sequence[Codes | None] = ()) -> ColouredMask:
+        """The camera's mask and its colours."""
         (mask,) = masks
         assert mask is not None
-        return mask
+        return ColouredMask(mask, codes[0] if codes else None)
 
-    def next_state(self, rng: np.random.Generator, state: State | None, observation: Mask) -> State | None:
+    def next_state(self, rng: np.random.Generator, state: State | None, observation: ColouredMask) -> State | None:
         """The tracker's state after a mask; None before the first mask that is not empty."""
         if state is None:
-            return self.tracker.start(rng, observation) if observation.any() else None
-        return self.tracker.step(rng, state, observation)
+            return self.tracker.start(rng, observation.mask)._replace(colours=self.colours) if observation.mask.any() else None
+        return self.tracker.step(rng, state, observation.mask, codes=observation.codes)
+
+    def turned_back(self, state: State | None) -> MonocularSubject:
+        """See `TrackedSubject`; it knows the arms' colours."""
+        return self if state is None else replace(self, colours=state.colours)
 
     def lean(self, found: MotionFrame, masks: Sequence[Mask | None]) -> float:
         """The lean of the head where an upper body is twisted into a profile, else NaN."""
@@ -145,9 +162,9 @@ class MonocularSubject(TrackedSubject):
         """A state without its observation."""
         return None if state is None else state._replace(observation=None)
 
-    def doubt(self, state: State, observation: Mask, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
+    def doubt(self, state: State, observation: ColouredMask, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
         """Doubt about the estimate of a mask."""
-        return self._doubt(state, observation, seconds, before)
+        return self._doubt(state, observation.mask, seconds, before)
 
     @cached_property
     def _doubt(self) -> MonocularDoubt:
@@ -159,7 +176,7 @@ class MonocularSubject(TrackedSubject):
 
     def draw(self, frames: FrameSet, found: MotionFrame, last: MotionFrame | None = None) -> Image:
         """Model, matching result and raw picture, one below the other."""
-        image, mask = frames.images[0], self.observe(frames.masks)
+        image, mask = frames.images[0], self.observe(frames.masks).mask
         assert image is not None
         pose = np.full(len(self.body.skeleton.dofs), np.nan) if found.pose is None else np.asarray(found.pose)
         ignored = mask & self.picture.legs(pose) if found.pose is not None and self.tracker.settings.ignore_legs else None

@@ -15,6 +15,7 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.colour_codes import Codes
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.camera.rasterize import Bits, Picture
 from shadowpuppet.errors import NOTED, Caution, SettingsError, choices
@@ -64,7 +65,7 @@ class MultiviewSubject(TrackedSubject):
     """Whether the sizes are the person's own, not average ones."""
     state_types = (MultiviewState, Particles, Unexplained, Before, Trail)
 
-    def observe(self, masks: Sequence[Mask | None]) -> HullObservation:
+    def observe(self, masks: Sequence[Mask | None], codes: Sequence[Codes | None] = ()) -> HullObservation:
         """Surface points of the visual hull of the masks, and the masks."""
         return HullObservation(self.hull.points(masks), masks, sum(mask is not None and may_be_person(mask) for mask in masks))
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.colour_codes import Codes, colour_codes
 from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.errors import SettingsError, SilhouetteError, VideoError, warn
 from shadowpuppet.io.recording import Recording
@@ -68,6 +69,8 @@ class FrameSet(NamedTuple):
     """Images that fit the masks, in the light of the empty scene (`Segmented.image`); empty: not known."""
     shadows: tuple[Mask | None, ...] = ()
     """As in `Seen`."""
+    codes: tuple[Codes | None, ...] = ()
+    """Coarse colours (`camera.colour_codes`) in place of `corrected`, with one camera."""
     points: SurfacePoints | None = None
     """Surface points of the visual hull of `masks`; None: not computed."""
     carving: float = 0.0
@@ -157,8 +160,9 @@ def _single_frames(rig: Rig, segment: Segment, ready: bool, every: int) -> Gener
         if (frame := next(frames, None)) is None:
             return
         decoded = time.perf_counter()
-        mask = segment(frame).mask
-        yield FrameSet(frame.time, (frame.image,), (mask,), decoded - start, time.perf_counter() - decoded)
+        found = segment(frame)
+        codes = colour_codes(found.image)
+        yield FrameSet(frame.time, (frame.image,), (found.mask,), decoded - start, time.perf_counter() - decoded, codes=(codes,))
 
 
 def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = False, every: int = 1,

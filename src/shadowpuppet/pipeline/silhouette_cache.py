@@ -5,6 +5,7 @@ They depend on neither the seed nor the tracker, and take most of the time of ru
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.colour_codes import Codes, thinned
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options, plain_options
@@ -22,7 +24,8 @@ SHARED = ("height", "distance", "fov", "calibration", "camera", "background", "m
           "every", "silhouette")
 """Options on which survey and silhouettes depend."""
 LIMIT = 256_000_000
-"""Greatest size of the kept silhouettes, bytes, at a bit a pixel: half an hour of one camera's 25 frames/s at 320 x 240."""
+"""Greatest size of the kept silhouettes, bytes, at a bit a pixel: half an hour of one camera's 25 frames/s at 320 x 240, and about half of
+that with the colours of what is in them."""
 
 
 def film_of(recording: str | Path, settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -44,17 +47,19 @@ class MaskStore:
     """Size of the stored masks, bytes."""
     complete: bool = False
     """Whether all frame sets of the recording are stored."""
-    sets: list[tuple[float, list[Packed | None], list[Packed | None]]] = field(default_factory=list)
-    """For each set its time (s) and, for each camera, `FrameSet.masks` and `FrameSet.own`; None for a camera without a mask."""
+    sets: list[tuple[float, list[Packed | None], list[Packed | None], list[bytes | None]]] = field(default_factory=list)
+    """For each set its time (s) and, for each camera, `FrameSet.masks`, `FrameSet.own` and, where the mask is, `FrameSet.codes`; None for a
+    camera without them."""
 
-    def add(self, time: float, masks: Sequence[Mask | None], own: Sequence[Mask | None] = ()) -> None:
-        """Store one frame set's masks."""
+    def add(self, time: float, masks: Sequence[Mask | None], own: Sequence[Mask | None] = (), codes: Sequence[Codes | None] = ()) -> None:
+        """Store one frame set's masks, and the colours in them."""
         if self.size > self.limit:
             self.sets.clear()
             return
         packed, alone = ([None if mask is None else (np.packbits(mask), mask.shape) for mask in each] for each in (masks, own))
-        self.sets.append((time, packed, alone))
-        self.size += sum(len(one[0]) for one in (*packed, *alone) if one is not None)
+        colours = [None if mask is None or code is None else zlib.compress(code[thinned(mask)].tobytes(), 1) for mask, code in zip(masks, codes)]
+        self.sets.append((time, packed, alone, colours))
+        self.size += sum(len(one[0]) for one in (*packed, *alone) if one is not None) + sum(len(one) for one in colours if one is not None)
 
     def __iter__(self) -> Iterator[FrameSet]:
         """The stored frame sets, without images."""
@@ -65,13 +70,14 @@ class MaskStore:
         yield from map(self._frame_set, reversed(range(len(self.sets))))
 
     def _frame_set(self, n: int) -> FrameSet:
-        time, packed, alone = self.sets[n]
-        return FrameSet(time, (None,) * len(packed), tuple(map(_unpacked, packed)), own=tuple(map(_unpacked, alone)))
+        time, packed, alone, colours = self.sets[n]
+        masks = tuple(map(_unpacked, packed))
+        return FrameSet(time, (None,) * len(packed), masks, own=tuple(map(_unpacked, alone)), codes=tuple(map(_codes, masks, colours)))
 
     def stored(self, frames: Iterable[FrameSet]) -> Generator[FrameSet]:
         """Pass frame sets on, and store their masks."""
         for each in frames:
-            self.add(each.time, each.masks, each.own)
+            self.add(each.time, each.masks, each.own, each.codes)
             yield each
         self.complete = self.size <= self.limit
 
@@ -81,6 +87,16 @@ def _unpacked(packed: Packed | None) -> Mask | None:
         return None
     bits, shape = packed
     return np.unpackbits(bits, count=int(np.prod(shape))).reshape(shape).view(np.bool_)
+
+
+def _codes(mask: Mask | None, packed: bytes | None) -> Codes | None:
+    """Colours in a mask (H, W), and 0 elsewhere."""
+    if mask is None or packed is None:
+        return None
+    inside = thinned(mask)
+    codes = np.zeros(inside.shape, np.uint16)
+    codes[inside] = np.frombuffer(zlib.decompress(packed), np.uint16)
+    return codes
 
 
 class SilhouetteCache:

@@ -16,6 +16,7 @@ from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.colour_codes import Codes
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Bits
 from shadowpuppet.errors import Caution
@@ -80,8 +81,8 @@ class TrackedSubject(ABC):
     """The named tuples in the tracker's state and in what the doubt about the next frame needs."""
 
     @abstractmethod
-    def observe(self, masks: Sequence[Mask | None]) -> Any:
-        """The tracker's observation of one frame set's silhouettes."""
+    def observe(self, masks: Sequence[Mask | None], codes: Sequence[Codes | None] = ()) -> Any:
+        """The tracker's observation of one frame set's silhouettes, and, with one camera, of their colours (`FrameSet.codes`)."""
 
     @abstractmethod
     def next_state(self, rng: np.random.Generator, state: Any, observation: Any) -> Any:
@@ -99,13 +100,17 @@ class TrackedSubject(ABC):
         """Observations of frame sets, one after another."""
         for each in frames:
             start = time.perf_counter()
-            observation = self.observe(each.masks)
+            observation = self.observe(each.masks, each.codes)
             yield Observed(each, observation, time.perf_counter() - start)
 
     @property
     def both_ways(self) -> bool:
         """Whether a film is tracked backward, too."""
         return False
+
+    def turned_back(self, state: Any) -> TrackedSubject:
+        """The subject that tracks a film backward after it has been tracked forward to a state, of which it keeps what it has learnt."""
+        return self
 
     def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
         """Motions of the same frames that were tracked forward and backward as one, and the weight (T,) of the backward one: 0 for subjects

@@ -95,8 +95,8 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         _check_cutoff(options, prepared.look.rate)
         subject, store = prepared.check(), MaskStore()
         store = store if subject.both_ways and options.smoothing[0] != "off" else None
-        leans = _track(writer, prepared, kind, options, listener, for_track, cache, store)
-        motion = writer.motion if store is None else _backward(writer, subject, options, listener, store)
+        leans, state = _track(writer, prepared, kind, options, listener, for_track, cache, store)
+        motion = writer.motion if store is None else _backward(writer, subject.turned_back(state), options, listener, store)
         smooth_run(writer, [(0, subject)], options, listener, motion, leans)
         writer.info |= floor_entry(writer.motion, rig.cameras, prepared.check().person)
     written = read_run(folder)
@@ -171,7 +171,7 @@ def _backward(writer: RunWriter, subject: TrackedSubject, options: Options, list
     start, rng = time.perf_counter(), np.random.default_rng(options.seed).spawn(3)[2]  # not that of the look or of the forward pass
     state = before = None
     for seen in reversed(store):
-        observation = subject.observe(seen.masks)
+        observation = subject.observe(seen.masks, seen.codes)
         state = subject.next_state(rng, state, observation)
         found, before = motion_frame(subject, -seen.time, state, observation, before)
         frames.append(found._replace(time=seen.time))
@@ -217,9 +217,9 @@ def _resumed(writer: RunWriter, prepared: Prepared, rng: np.random.Generator) ->
 
 
 def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, listener: Listener, rng: np.random.Generator,
-           cache: SilhouetteCache | None, store: MaskStore | None) -> Sequence[float]:
-    """For each frame set: make silhouettes and observation, update the tracker's state, write the result. Returns the `lean` of each.
-    `store`: is filled with the silhouettes."""
+           cache: SilhouetteCache | None, store: MaskStore | None) -> tuple[Sequence[float], Any]:
+    """For each frame set: make silhouettes and observation, update the tracker's state, write the result. Returns the `lean` of each, and
+    the last state. `store`: is filled with the silhouettes."""
     subject, survey, timer = prepared.check(), prepared.survey, StageTimer()
     (look, _, state, before, left_out), earlier = _resumed(writer, prepared, rng)
     writer.begin()
@@ -268,4 +268,4 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
         writer.metrics |= timings(timer, kind.stages, count - len(earlier), time.perf_counter() - began)
         writer.metrics |= left_out_metrics(left_out, [footage.view.camera for footage in survey.rig.footage])
         writer.metrics |= set_aside(watch.intervals, survey.rig.names)
-    return leans
+    return leans, state

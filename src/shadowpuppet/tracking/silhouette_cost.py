@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +25,8 @@ class Observation:
     """Pixels that do not count. They are set in the silhouette and in drawn poses, so that they never differ."""
     also: Cost | None = None
     """A cost of your own, in pixels, added to eq. 2 wherever poses are weighed."""
+    arms: PartObservation | None = None
+    """What shows some parts of the arms alone, if anything does."""
 
     @classmethod
     def of(cls, mask: ArrayLike, ignore: ArrayLike | None = None, also: Cost | None = None) -> Observation:
@@ -46,7 +49,7 @@ class Observation:
     def ignoring(self, pixels: ArrayLike) -> Observation:
         """The observation in which the pixels (H, W) do not count either."""
         skipped = pack(pixels)
-        return Observation(self.silhouette | skipped, self.ignore | skipped, self.also)
+        return replace(self, silhouette=self.silhouette | skipped, ignore=self.ignore | skipped)
 
     @property
     def area(self) -> int:
@@ -57,6 +60,14 @@ class Observation:
         """Pixels that differ from a drawn silhouette (eq. 2), and intersection over union with it."""
         drawn, seen = drawn & ~self.ignore, self.silhouette & ~self.ignore
         return float(count(drawn ^ seen)), count(drawn & seen) / max(count(drawn | seen), 1)
+
+
+class PartObservation(NamedTuple):
+    """The silhouette of some of the body's parts alone."""
+
+    observation: Observation
+    parts: tuple[str, ...]
+    """Names of the parts."""
 
 
 class PartialCost:

@@ -69,6 +69,9 @@ class MonocularSettings:
     """Pull to usual postures (pixels per squared deviation, at 320 x 240; see `Skeleton.posture_penalty`)."""
     limits: bool = True
     """Keep joint limits."""
+    arm_colours: bool = True
+    """Learn the colours of the person's hands, and of bare forearms, and find the arms before the trunk by them, where they differ from those
+    of the clothes."""
     recover: bool = True
     """Search for the person again after a loss or an absence. The papers' filters continue from their last particles."""
     turned: bool = True
@@ -96,6 +99,7 @@ PRESETS: dict[str, dict] = {
         "estimate": "best",
         "motion_weight": 0.0,
         "posture_weight": 0.0,
+        "arm_colours": False,
         "turned": False,
         "patience": 0.0,
         "both_ways": False,

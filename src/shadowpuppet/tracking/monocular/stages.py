@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from shadowpuppet.body.segments import dofs_of, keep_limb_directions, limbs_of, parts_of, segments_of
@@ -29,6 +31,7 @@ class FilterStage:
         self.dofs = np.array(sorted(part_of), np.int64)
         self.other_legs = [limb for limb in limbs_of(skeleton) if limb.endswith("leg") and limb not in self.parts]
         self.moves_torso = "torso" in self.parts
+        self.moves_arms = any(part.endswith("arm") for part in self.parts)
         hide = self.parts == ("torso",) and settings.torso_arms == "hidden"
         arms = [part for arm in ("left_arm", "right_arm") for part in parts_of(picture.body, arm)]
         self.partial = PartialCost(picture, self.dofs, arms if hide else ())
@@ -68,7 +71,8 @@ class FilterStage:
             others: the pose (D,) that all other DOF are taken from.
             last: the last frame's estimate (D,), for `extra_costs`.
         """
-        silhouette, extras = self.partial.costs(observation, others), self.extra_costs(observation, last)
+        silhouette = self.partial.costs(observation, others)
+        extras = self.arm_costs(observation, others) + self.extra_costs(observation, last)
 
         def weigh(values: Array) -> tuple[Array, Array]:
             poses = self.put(others, values)
@@ -82,6 +86,20 @@ class FilterStage:
     def extra_costs(self, observation: Observation, last: Array) -> list[Cost]:
         """Costs added to eq. 2: the caller's own, if there is one."""
         return [] if observation.also is None else [observation.also]
+
+    def arm_costs(self, observation: Observation, others: Array) -> list[Cost]:
+        """Eq. 2 of those parts of the arms that are seen by themselves, if any are, with all that does not vary as in `others` (D,)."""
+        seen = observation.arms
+        if seen is None or not self.moves_arms:
+            return []
+        if seen.parts not in self._partials:
+            self._partials[seen.parts] = PartialCost(self.picture, self.dofs, set(self.picture.body.parts) - set(seen.parts))
+        return [self._partials[seen.parts].costs(seen.observation, others)]
+
+    @cached_property
+    def _partials(self) -> dict[tuple[str, ...], PartialCost]:
+        """By the parts that are drawn."""
+        return {}
 
     def estimate(self, particles: Particles) -> Array:
         """The stage's estimate: values (d,) of the particle of least cost."""

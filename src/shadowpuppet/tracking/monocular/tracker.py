@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.segments import dofs_of, limbs_of
 from shadowpuppet.body.upper_body import TWIST
+from shadowpuppet.camera.colour_codes import Codes
 from shadowpuppet.camera.mask import Mask, check_mask
 from shadowpuppet.camera.rasterize import Picture, count, pack
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular import pose_search
+from shadowpuppet.tracking.monocular.arm_colours import WELL, ArmColours, ColourCounts
 from shadowpuppet.tracking.monocular.extended_stage import make_stage
 from shadowpuppet.tracking.monocular.leg_postures import FLOOR_WEIGHT, floor_below, floor_cost, posture_penalty
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
@@ -60,6 +62,8 @@ class State(NamedTuple):
     """Least misfit of a whole body since then, pixels."""
     observation: Observation | None = None
     """The frame's, which the estimate was judged by."""
+    colours: ColourCounts | None = None
+    """Those of the person's arms and of the rest, as seen so far."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,25 +81,28 @@ class MonocularTracker:
     """Whether the film is blurred by motion. A silhouette then has what a limb covers at any time of the exposure, which is too wide; what
     is covered since this frame only, and so for a part of the exposure, does not count, except in the status."""
 
-    def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
+    def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None, codes: Codes | None = None) -> State:
         """The state after a new mask (H, W). If no person is visible the pose is held; after a loss the person is searched for (`recover`).
-        `also`: a cost of your own, poses (N, D) to pixels (N,), added to eq. 2. Raises `TrackingError` for a mask of another size than the
-        camera's."""
+        `also`: a cost of your own, poses (N, D) to pixels (N,), added to eq. 2; `codes`: the picture's colours (`colour_codes`), if the
+        arms may be found by them. Raises `TrackingError` for a mask of another size than the camera's."""
         mask = check_mask(mask, self.picture.camera.size)
         rest = without(mask, state.unexplained)
         found = track_or_recover(
             state, is_absent=self.is_absent(rest, state.pose), recover=self.settings.recover, hold=self.absent,
-            cycle=lambda state: self.cycle(rng, state, mask, also), search=lambda: self.start(rng, rest, also))  # fmt: skip
+            cycle=lambda state: self.cycle(rng, state, mask, also, codes), search=lambda: self.start(rng, rest, also))  # fmt: skip
         found = self.searched_again(rng, found._replace(followed=state.followed + 1, least=state.least), rest, also)
         if self.looks:
             found = found._replace(unexplained=self.unexplained(state.unexplained, mask, found))
+        found = found._replace(colours=self.learnt(state.colours, codes, rest, found))
         return found._replace(mask=mask) if self.blurred else found
 
-    def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
+    def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None, codes: Codes | None = None) -> State:
         """The loop body of Algorithm 2 on a mask (H, W), `cycles` times: each stage resamples, diffuses and weighs (Algorithms 3, 4)."""
         last, particles = state.pose, list(state.particles)
         estimate, whole = last, self.observe(mask, last, also, state.unexplained)
         observation = whole if state.mask is None else whole.ignoring(mask & ~state.mask)
+        if codes is not None and self.settings.arm_colours:
+            observation = replace(observation, arms=self.arm_colours.seen(state.colours, codes, mask, last, observation.ignore))
         narrow = self.settings.turned and self.is_narrow(mask, last)
         for cycle in range(self.settings.cycles):
             others = estimate  # values of the DOF outside a stage; later stages see the torso's new estimate, but not a limb's
@@ -163,6 +170,11 @@ class MonocularTracker:
         legs = self.picture.legs(state.pose) if self.settings.ignore_legs and self.picture.body.hem is not None else None
         return look_beside(last, mask, self.picture.mask(state.pose), self.looks, legs)
 
+    def learnt(self, colours: ColourCounts | None, codes: Codes | None, mask: Mask, state: State) -> ColourCounts | None:
+        """The colours seen so far, with those in the frame of a new state, of its mask (H, W), if its estimate fits well."""
+        fits = state.status not in ("absent", "lost") and state.overlap > WELL
+        return self.arm_colours.learnt(colours, codes, mask, state.pose) if codes is not None and self.settings.arm_colours and fits else colours
+
     def judge(self, pose: Array, particles: list[Particles], observation: Observation) -> State:
         """The state of an estimate (D,), with its cost, overlap and status."""
         cost, overlap = observation.cost_and_overlap(self.picture.draw(pose))
@@ -190,6 +202,11 @@ class MonocularTracker:
     def absent(state: State) -> State:
         """The state while no person is visible: the pose is held."""
         return state._replace(cost=np.nan, overlap=0.0, status="absent")
+
+    @cached_property
+    def arm_colours(self) -> ArmColours:
+        """Finds the arms by their colours."""
+        return ArmColours(self.picture)
 
     @cached_property
     def floor(self) -> float | None:

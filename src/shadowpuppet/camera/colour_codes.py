@@ -1,0 +1,36 @@
+"""Coarse colours of a picture's pixels, as numbers that can be counted: 16 levels a channel."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+LEVELS = 16
+"""Number of levels of each channel."""
+NUMBER = LEVELS**3
+"""Number of colours."""
+ENOUGH = 320 * 240
+"""Number of pixels that say enough about colours; in larger pictures some are left out."""
+
+Codes = NDArray[np.uint16]
+"""Colours, 0 to `NUMBER` - 1, of the pixels that `thinned` leaves."""
+
+
+def step_of(size: tuple[int, int]) -> int:
+    """Distance (pixels) of those that are looked at in a picture of a width and height."""
+    return max(1, round((size[0] * size[1] / ENOUGH) ** 0.5))
+
+
+def thinned(pixels: NDArray) -> NDArray:
+    """The pixels that are looked at in a picture or mask (H, W, ...)."""
+    step = step_of((pixels.shape[1], pixels.shape[0]))
+    return np.ascontiguousarray(pixels[::step, ::step])
+
+
+def colour_codes(image: NDArray[np.uint8] | None) -> Codes | None:
+    """The colours of an image (H, W, 3) or (H, W); None for None."""
+    if image is None:
+        return None
+    levels = (thinned(image) // (256 // LEVELS)).astype(np.uint16)
+    blue, green, red = np.moveaxis(levels, 2, 0) if levels.ndim > 2 else (levels,) * 3
+    return (blue * LEVELS + green) * LEVELS + red

@@ -1,0 +1,144 @@
+"""Arms before the trunk, found by the colours of this person's hands, and of their forearms if these are bare. Not in Liu 2011.
+
+A silhouette does not show where an arm is before the trunk; its colours do, be they a skin's or a glove's. They are counted where hands and
+forearms are beside the trunk, in the tracked poses, and compared with those of trunk and legs. If they differ, the pixels that have the arms'
+colours are a second silhouette, of these parts alone, and eq. 2 compares it with them as it compares the first with the whole body.
+
+No picture is kept, only how often each of 4096 coarse colours was seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.camera.colour_codes import LEVELS, NUMBER, Codes, step_of, thinned
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.rasterize import Bits, Picture, pack, unpack
+from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.silhouette_cost import Observation, PartObservation
+
+ENOUGH, ENOUGH_REST = 150, 2000
+"""Least number of pixels that hands or forearms, and trunk and legs, have been seen in before they are compared."""
+LIKELIER = 2.0
+"""How much more frequent on arms than on trunk and legs the colours of an arm's pixels are, at least."""
+FOUND, MISTAKEN = 0.6, 0.1
+"""Least share of a part's pixels with such colours, and greatest share of the trunk's and legs', if the part differs from these."""
+WELL = 0.8
+"""Least overlap of body and silhouette at which colours are learnt."""
+RARE = 1e-5
+"""Added to every colour's frequency: one that is hardly seen says nothing."""
+NEIGHBOURS = 0.2
+"""Share of a colour's pixels that each neighbour gets, along each channel, as noise and shading change a colour a little."""
+ABOUT_HEAD, ABOUT_ARMS, EDGE = 4, 3, 1
+"""Bodies do not fit to the pixel: within the first distance (pixels at 320 x 240) of the head, whose skin may have the hands' colour, no
+pixel counts; within the others, of the arms and of other parts' edges, no colour is learnt."""
+
+
+class ColourCounts(NamedTuple):
+    """Number of pixels of each colour that have been seen on hands, on forearms and on trunk and legs, each (4096,)."""
+
+    hand: NDArray[np.int64]
+    forearm: NDArray[np.int64]
+    rest: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class ArmColours:
+    """Learns the colours of a body's arms in a camera's picture, and finds them there."""
+
+    picture: Picture
+
+    def learnt(self, counts: ColourCounts | None, codes: Codes, mask: Mask, pose: Array) -> ColourCounts:
+        """The counts with those of one more frame, of its mask (H, W) and the pose (D,) found in it."""
+        last = ColourCounts(*np.zeros((3, NUMBER), np.int64)) if counts is None else counts
+        hand, forearm, upper, head, rest = (thinned(self._drawn(pose, kind)) for kind in KINDS)
+        others, arms = rest | head | upper, hand | forearm | upper
+        shown = (hand & ~others, _grown(forearm, -EDGE) & ~_grown(others, EDGE), _grown(rest, -EDGE) & ~_grown(arms, ABOUT_ARMS) & ~head)
+        own = thinned(mask)
+        return ColourCounts(*(each + np.bincount(codes[pixels & own], minlength=NUMBER) for each, pixels in zip(last, shown)))
+
+    def seen(self, counts: ColourCounts | None, codes: Codes, mask: Mask, pose: Array, ignore: Bits) -> PartObservation | None:
+        """The pixels of a mask (H, W) that have the arms' colours, and the parts that these are; None if they are not known, or do not
+        differ from those of trunk and legs. The head as in `pose` (D,) is left out, and so are the pixels `ignore`."""
+        if counts is None:
+            return None
+        kinds, of_arms = distinct(counts, "hand" if len(self._shapes["hand"]) else "forearm")
+        if not kinds:
+            return None
+        step = step_of(self.picture.camera.size)
+        found = _grown(_grown(of_arms[codes] & thinned(mask), -1), 1)  # without single pixels
+        found = found.repeat(step, 0).repeat(step, 1)[: mask.shape[0], : mask.shape[1]] & mask
+        ignored = ignore | pack(_grown(self._drawn(pose, "head"), ABOUT_HEAD * step))
+        return PartObservation(Observation(pack(found) | ignored, ignored), tuple(self._names(kinds)))
+
+    def _drawn(self, pose: Array, kind: str) -> Mask:
+        """The parts of a kind in a pose (D,), as a mask (H, W)."""
+        return unpack(self.picture.draw(pose, self._shapes[kind]), self.picture.camera.size[0])
+
+    @cached_property
+    def _shapes(self) -> dict[str, NDArray[np.int64]]:
+        """Indices of the body's shapes of each kind."""
+        kinds = [kind_of(part) for part in self.picture.body.parts]
+        return {kind: np.flatnonzero([each == kind for each in kinds]) for kind in KINDS}
+
+    def _names(self, kinds: Iterable[str]) -> list[str]:
+        """Names of the parts of some kinds."""
+        return [part for part in dict.fromkeys(self.picture.body.parts) if kind_of(part) in kinds]
+
+
+KINDS = ("hand", "forearm", "upper_arm", "head", "rest")
+"""Kinds of parts whose colours may differ; `rest`: trunk and legs."""
+
+
+def kind_of(part: str) -> str:
+    """The kind of a body's part."""
+    name = part.partition("_")[2] if part.partition("_")[0] in SIDES else part
+    name = {"lower_arm": "forearm", "neck": "head"}.get(name, name)
+    return name if name in KINDS else "rest"
+
+
+def distinct(counts: ColourCounts, outermost: str = "hand") -> tuple[tuple[str, ...], NDArray[np.bool_]]:
+    """The kinds of parts whose colours differ from those of trunk and legs, and whether each colour (4096,) is theirs. None if the
+    arm's `outermost` kind does not: an arm's place is known by its end."""
+    if counts.rest.sum() < ENOUGH_REST:
+        return (), np.zeros(0, bool)
+    rest, kinds, sum_of_kinds = _frequencies(counts.rest), list[str](), np.zeros(NUMBER)
+    for kind in ("hand", "forearm"):
+        number = getattr(counts, kind)
+        if number.sum() < ENOUGH:
+            continue
+        own = _frequencies(number)
+        likelier = own + RARE > LIKELIER * (rest + RARE)
+        if own[likelier].sum() > FOUND and rest[likelier].sum() < MISTAKEN:
+            kinds.append(kind)
+            sum_of_kinds += own
+    if outermost not in kinds:
+        return (), np.zeros(0, bool)
+    return tuple(kinds), sum_of_kinds / len(kinds) + RARE > LIKELIER * (rest + RARE)
+
+
+def _frequencies(numbers: NDArray[np.int64]) -> Array:
+    """Frequencies (4096,) of colours seen in numbers of pixels, smoothed along each channel."""
+    found = numbers.reshape((LEVELS,) * 3) / max(numbers.sum(), 1)
+    for axis in range(3):
+        along = np.moveaxis(found, axis, 0)
+        smooth = (1 - 2 * NEIGHBOURS) * along
+        smooth[1:] += NEIGHBOURS * along[:-1]
+        smooth[:-1] += NEIGHBOURS * along[1:]
+        found = np.moveaxis(smooth, 0, axis)
+    return found.ravel()
+
+
+def _grown(mask: Mask, by: int) -> Mask:
+    """A mask (H, W) grown by a number of pixels to all sides; shrunk if it is negative."""
+    import cv2
+
+    square = np.ones((2 * abs(by) + 1,) * 2, np.uint8)
+    return (cv2.dilate if by > 0 else cv2.erode)(mask.view(np.uint8), square).view(bool)
