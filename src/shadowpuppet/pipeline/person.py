@@ -13,8 +13,8 @@ from shadowpuppet.body.models import WHOLE
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.body.upper_body import TWIST
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.drawing import overlay_frame
 from shadowpuppet.camera.colour_codes import Codes
+from shadowpuppet.camera.drawing import overlay_frame
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution, RecordingError, SilhouetteError, TrackingError

@@ -57,9 +57,11 @@ class MaskStore:
             self.sets.clear()
             return
         packed, alone = ([None if mask is None else (np.packbits(mask), mask.shape) for mask in each] for each in (masks, own))
-        colours = [None if mask is None or code is None else zlib.compress(code[thinned(mask)].tobytes(), 1) for mask, code in zip(masks, codes)]
+        colours = [None if mask is None or each is None else zlib.compress(each[thinned(mask)].tobytes(), 1)
+                   for mask, each in zip(masks, codes)]
         self.sets.append((time, packed, alone, colours))
-        self.size += sum(len(one[0]) for one in (*packed, *alone) if one is not None) + sum(len(one) for one in colours if one is not None)
+        self.size += sum(len(one[0]) for one in (*packed, *alone) if one is not None)
+        self.size += sum(len(one) for one in colours if one is not None)
 
     def __iter__(self) -> Iterator[FrameSet]:
         """The stored frame sets, without images."""

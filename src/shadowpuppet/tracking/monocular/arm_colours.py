@@ -1,8 +1,8 @@
 """Arms before the trunk, found by the colours of this person's hands, and of their forearms if these are bare. Not in Liu 2011.
 
 A silhouette does not show where an arm is before the trunk; its colours do, be they a skin's or a glove's. They are counted where hands and
-forearms are beside the trunk, in the tracked poses, and compared with those of trunk and legs. If they differ, the pixels that have the arms'
-colours are a second silhouette, of these parts alone, and eq. 2 compares it with them as it compares the first with the whole body.
+forearms are beside the trunk, in the tracked poses, and compared with those of trunk and legs. If they differ, the pixels that have the
+arms' colours are a second silhouette, of these parts alone, and eq. 2 compares it with them as the first with the whole body.
 
 No picture is kept, only how often each of 4096 coarse colours was seen.
 """
@@ -65,8 +65,9 @@ class ArmColours:
         return ColourCounts(*(each + np.bincount(codes[pixels & own], minlength=NUMBER) for each, pixels in zip(last, shown)))
 
     def seen(self, counts: ColourCounts | None, codes: Codes, mask: Mask, pose: Array, ignore: Bits) -> PartObservation | None:
-        """The pixels of a mask (H, W) that have the arms' colours, and the parts that these are; None if they are not known, or do not
-        differ from those of trunk and legs. The head as in `pose` (D,) is left out, and so are the pixels `ignore`."""
+        """The pixels of a mask (H, W) that have the arms' colours, and the parts that these are; None if the colours are not known, or do
+        not differ from those of trunk and legs. Pixels on the head, and of an upper body those where its legs may be, both as in the last
+        frame's `pose` (D,), do not count, nor do those in `ignore`."""
         if counts is None:
             return None
         kinds, of_arms = distinct(counts, "hand" if len(self._shapes["hand"]) else "forearm")
@@ -75,7 +76,7 @@ class ArmColours:
         step = step_of(self.picture.camera.size)
         found = _grown(_grown(of_arms[codes] & thinned(mask), -1), 1)  # without single pixels
         found = found.repeat(step, 0).repeat(step, 1)[: mask.shape[0], : mask.shape[1]] & mask
-        ignored = ignore | pack(_grown(self._drawn(pose, "head"), ABOUT_HEAD * step))
+        ignored = ignore | self.picture.leg_bits(pose) | pack(_grown(self._drawn(pose, "head"), ABOUT_HEAD * step))
         return PartObservation(Observation(pack(found) | ignored, ignored), tuple(self._names(kinds)))
 
     def _drawn(self, pose: Array, kind: str) -> Mask:

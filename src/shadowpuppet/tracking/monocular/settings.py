@@ -70,8 +70,8 @@ class MonocularSettings:
     limits: bool = True
     """Keep joint limits."""
     arm_colours: bool = True
-    """Learn the colours of the person's hands, and of bare forearms, and find the arms before the trunk by them, where they differ from those
-    of the clothes."""
+    """Learn the colours of the person's hands, and of forearms if these are bare, and find arms before the trunk by them, where they are
+    unlike those of the clothes."""
     recover: bool = True
     """Search for the person again after a loss or an absence. The papers' filters continue from their last particles."""
     turned: bool = True

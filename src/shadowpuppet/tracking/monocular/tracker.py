@@ -102,7 +102,7 @@ class MonocularTracker:
         estimate, whole = last, self.observe(mask, last, also, state.unexplained)
         observation = whole if state.mask is None else whole.ignoring(mask & ~state.mask)
         if codes is not None and self.settings.arm_colours:
-            observation = replace(observation, arms=self.arm_colours.seen(state.colours, codes, mask, last, observation.ignore | self.picture.leg_bits(last)))
+            observation = replace(observation, arms=self.arm_colours.seen(state.colours, codes, mask, last, observation.ignore))
         narrow = self.settings.turned and self.is_narrow(mask, last)
         for cycle in range(self.settings.cycles):
             others = estimate  # values of the DOF outside a stage; later stages see the torso's new estimate, but not a limb's
@@ -171,9 +171,11 @@ class MonocularTracker:
         return look_beside(last, mask, self.picture.mask(state.pose), self.looks, legs)
 
     def learnt(self, colours: ColourCounts | None, codes: Codes | None, mask: Mask, state: State) -> ColourCounts | None:
-        """The colours seen so far, with those in the frame of a new state, of its mask (H, W), if its estimate fits well."""
-        fits = state.status not in ("absent", "lost") and state.overlap > WELL
-        return self.arm_colours.learnt(colours, codes, mask, state.pose) if codes is not None and self.settings.arm_colours and fits else colours
+        """The colours seen so far, with those in a new state's frame, of its mask (H, W), if the estimate fits well."""
+        fits = state.status != "absent" and state.overlap > WELL
+        if codes is None or not self.settings.arm_colours or not fits:
+            return colours
+        return self.arm_colours.learnt(colours, codes, mask, state.pose)
 
     def judge(self, pose: Array, particles: list[Particles], observation: Observation) -> State:
         """The state of an estimate (D,), with its cost, overlap and status."""
