@@ -59,7 +59,8 @@ class Case:
             survey = replace(survey, rig=Rig(recording, (replace(footage, recording=recording),)))
         frames = [(frame.time, survey.silhouettes[0].segmented(frame)) for frame in footage.frames(masks)]
         times, tracked = np.array([time for time, _ in frames]), [found.mask for _, found in frames]
-        return cls(path.name, survey, times, tracked, [colour_codes(found.image) for _, found in frames], read_joints(footage.recording.truth))
+        codes = [colour_codes(found.image) for _, found in frames]
+        return cls(path.name, survey, times, tracked, codes, read_joints(footage.recording.truth))
 
     @property
     def camera(self) -> Camera:

@@ -96,6 +96,8 @@ FAULTS: dict[str, Fault] = {
     "obstacle": _during(_obstacle),
     "thing": _during(_thing),
 }
+OTHER_MOMENTS = ("frozen", "second person")
+"""Faults that put silhouettes of other moments into a frame, which its colours do not fit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,11 +169,12 @@ def track_monocular(path: Path) -> Iterator[Tracked]:
     model, angles = variance_model("monocular"), np.array([dof.kind == "rotation" for dof in skeleton.dofs])
     for n, (fault, spoil) in enumerate(FAULTS.items()):
         masks, rng = spoil(np.random.default_rng(n), case.masks, rate), np.random.default_rng(1)
+        codes = [None] * len(masks) if fault in OTHER_MOMENTS else case.codes
         tracker = MonocularTracker(picture, options.tracker)
         doubt, state, before, rows, poses, deviations, statuses = MonocularDoubt(tracker), None, None, [], [], [], list[str]()
         modes = list[tuple[float, float]]()
-        for n, (seconds, mask) in enumerate(zip(case.times.tolist(), masks)):
-            state = tracker.start(rng, mask) if state is None else tracker.step(rng, state, mask)
+        for n, (seconds, mask, seen) in enumerate(zip(case.times.tolist(), masks, codes)):
+            state = tracker.start(rng, mask) if state is None else tracker.step(rng, state, mask, codes=seen)
             found, before = doubt.evidence(state, mask, seconds, before)
             rows.append(found.components)
             poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)

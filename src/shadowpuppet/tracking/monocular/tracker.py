@@ -60,10 +60,10 @@ class State(NamedTuple):
     """Number of frames since the person was last searched for."""
     least: float = np.inf
     """Least misfit of a whole body since then, pixels."""
-    observation: Observation | None = None
-    """The frame's, which the estimate was judged by."""
     colours: ColourCounts | None = None
     """Those of the person's arms and of the rest, as seen so far."""
+    observation: Observation | None = None
+    """The frame's, which the estimate was judged by."""
 
 
 @dataclass(frozen=True, eq=False)
