@@ -118,6 +118,10 @@ def test_who_stood_still_is_tracked(whole):
     assert np.ptp(hands[..., 2], axis=0).max() > 0.3  # they waved
 
 
+def test_the_colours_of_arms_are_learnt(whole):
+    assert whole[0].session._state.colours.rest.sum() > 0
+
+
 def test_rows_have_the_camera_s_times(whole):
     _, outcomes = whole
     times = [outcome.frame.time for outcome in outcomes if outcome.frame is not None]

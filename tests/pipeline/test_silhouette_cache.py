@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from follower import followed
 
+from shadowpuppet.camera.colour_codes import colour_codes, thinned
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.prepare import MULTIVIEW
@@ -92,6 +93,17 @@ def test_a_store_keeps_what_cameras_had_before_others_added_to_it(rng):
     np.testing.assert_array_equal(one.own[:2], own[:2])
     assert one.own[2] is None
     assert other.own == ()
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (120, 160), (480, 640)])
+def test_a_store_keeps_the_colours_of_what_is_in_the_mask(rng, shape):
+    store, mask = MaskStore(), rng.random(shape) < 0.5
+    codes = colour_codes(rng.integers(0, 256, (*shape, 3), np.uint8))
+    store.add(0.0, [mask, mask, None], (), [codes, None, codes])
+    (found,) = store
+    np.testing.assert_array_equal(found.codes[0], np.where(thinned(mask), codes, 0))
+    assert found.codes[1:] == (None, None)
+    assert store.size > 2 * -(-mask.size // 8)
 
 
 def test_a_full_store_holds_nothing():

@@ -77,6 +77,23 @@ def test_a_film_is_also_tracked_backward_where_the_run_is_smoothed(recording, tm
     assert (long.folder / "joints.csv").read_bytes() == (once.folder / "joints.csv").read_bytes()  # too many silhouettes to be kept
 
 
+def test_backward_the_arms_colours_are_known_from_the_start(recording, tmp_path, monkeypatch):
+    """All that was seen forward, and of the film's pictures, not only of those since the tracker turned back."""
+    known = []
+
+    def backward(writer, subject, options, listener, store):
+        known.append((subject.colours, list(store)))
+        return writer.motion
+
+    monkeypatch.setattr("shadowpuppet.pipeline.track._backward", backward)
+    track_recording(recording, tmp_path / "run", make_options(QUICK))
+    ((colours, sets),) = known
+    assert colours.rest.sum() > 0
+    assert all(frames.codes[0][frames.masks[0]].any() for frames in sets)
+    track_recording(recording, tmp_path / "run", make_options(QUICK | {"tracker": {**QUICK["tracker"], "arm_colours": False}}))
+    assert known[1][0] is None
+
+
 class Stops(Listener):
     """Breaks a run off at a frame."""
 
