@@ -1,4 +1,4 @@
-"""Colours of hands and bare forearms are learnt where they are seen, and find the arms before the trunk; like clothes, they change nothing."""
+"""Colours of hands and bare forearms are learnt where they are seen, and find arms before the trunk; like clothes, they change nothing."""
 
 from __future__ import annotations
 
@@ -81,8 +81,8 @@ def test_without_an_image_there_are_none():
 
 
 def test_kinds_of_parts():
-    assert [kind_of(part) for part in ("left_hand", "right_lower_arm", "right_forearm", "left_upper_arm", "neck", "torso", "left_shank")] == [
-        "hand", "forearm", "forearm", "upper_arm", "head", "rest", "rest"]
+    parts = ("left_hand", "right_lower_arm", "right_forearm", "left_upper_arm", "neck", "torso", "left_shank")
+    assert [kind_of(part) for part in parts] == ["hand", "forearm", "forearm", "upper_arm", "head", "rest", "rest"]
 
 
 @pytest.mark.parametrize("size", [(320, 240), (640, 480)])
