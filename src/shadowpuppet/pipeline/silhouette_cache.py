@@ -24,8 +24,7 @@ SHARED = ("height", "distance", "fov", "calibration", "camera", "background", "m
           "every", "silhouette")
 """Options on which survey and silhouettes depend."""
 LIMIT = 256_000_000
-"""Greatest size of the kept silhouettes, bytes, at a bit a pixel: half an hour of one camera's 25 frames/s at 320 x 240, and about half of
-that with the colours of what is in them."""
+"""Greatest size of the kept silhouettes, bytes: about half an hour of one camera's 25 frames/s at 320 x 240."""
 
 
 def film_of(recording: str | Path, settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -33,13 +32,13 @@ def film_of(recording: str | Path, settings: Mapping[str, Any]) -> dict[str, Any
     return {"recording": str(Path(recording).resolve()), **{name: settings.get(name) for name in SHARED}}
 
 
-Packed = tuple[NDArray[np.uint8], tuple[int, ...]]
-"""A mask's bits, eight a byte, and its shape (H, W)."""
+Packed = tuple[bytes, tuple[int, ...]]
+"""A mask's bits, compressed, and its shape (H, W)."""
 
 
 @dataclass
 class MaskStore:
-    """Masks of a recording's frame sets, in order, packed to bits; emptied once they exceed the limit."""
+    """Masks of a recording's frame sets, in order, compressed; emptied once they exceed the limit."""
 
     limit: int = LIMIT
     """Greatest size, bytes."""
@@ -56,9 +55,8 @@ class MaskStore:
         if self.size > self.limit:
             self.sets.clear()
             return
-        packed, alone = ([None if mask is None else (np.packbits(mask), mask.shape) for mask in each] for each in (masks, own))
-        colours = [None if mask is None or each is None else zlib.compress(each[thinned(mask)].tobytes(), 1)
-                   for mask, each in zip(masks, codes)]
+        packed, alone = ([None if mask is None else (_compressed(np.packbits(mask)), mask.shape) for mask in each] for each in (masks, own))
+        colours = [None if mask is None or each is None else _compressed(each[thinned(mask)]) for mask, each in zip(masks, codes)]
         self.sets.append((time, packed, alone, colours))
         self.size += sum(len(one[0]) for one in (*packed, *alone) if one is not None)
         self.size += sum(len(one) for one in colours if one is not None)
@@ -84,11 +82,15 @@ class MaskStore:
         self.complete = self.size <= self.limit
 
 
+def _compressed(values: NDArray) -> bytes:
+    return zlib.compress(values.tobytes(), 1)
+
+
 def _unpacked(packed: Packed | None) -> Mask | None:
     if packed is None:
         return None
     bits, shape = packed
-    return np.unpackbits(bits, count=int(np.prod(shape))).reshape(shape).view(np.bool_)
+    return np.unpackbits(np.frombuffer(zlib.decompress(bits), np.uint8), count=int(np.prod(shape))).reshape(shape).view(np.bool_)
 
 
 def _codes(mask: Mask | None, packed: bytes | None) -> Codes | None:
