@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -13,6 +14,7 @@ from people import camera, picture, shapes_of
 
 from shadowpuppet.camera.colour_codes import NUMBER, Codes, colour_codes, step_of, thinned
 from shadowpuppet.camera.rasterize import Picture, unpack
+from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
 from shadowpuppet.tracking.monocular.arm_colours import ENOUGH, ENOUGH_REST, ArmColours, ColourCounts, distinct, kind_of
 from shadowpuppet.tracking.monocular.settings import make_settings
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
@@ -198,3 +200,39 @@ def test_the_papers_filter_does_without():
     image, mask = painted(pose, view(), BARE)
     rng = np.random.default_rng(0)
     assert of.step(rng, of.start(rng, mask), mask, codes=colour_codes(image)).colours is None
+
+
+# Doubt ----------------------------------------------------------------------------------------------------------------
+
+
+def test_an_arm_that_is_elsewhere_does_not_match():
+    """As many pixels as the true arm and the wrong one have together, over the wrong one's."""
+    counts, _ = counts_of(BARE, view())
+    true, wrong = poses_of_arms(30)[-1], poses_of_arms(30)[0]
+    image, mask = painted(true, view(), BARE)
+    colours = ArmColours(view())
+    seen = colours.seen(counts, colour_codes(image), mask, true, view().empty())
+    right = colours.mismatch(seen, true)
+    assert set(right) == {"left_arm", "right_arm"}
+    assert max(right.values()) < 0.3
+    found = colours.mismatch(seen, wrong)
+    drawn = {side: unpack(view().draw(wrong, shapes_of(view().body, f"{side}_hand", f"{side}_forearm")), 320) for side in ("left", "right")}
+    shown, counted = unpack(seen.observation.silhouette, 320), ~unpack(seen.observation.ignore, 320)
+    over = (shown & counted & ~drawn["left"] & ~drawn["right"]).sum()
+    for side, own in drawn.items():
+        expected = ((own & counted & ~shown).sum() + over) / (own & counted).sum()
+        assert found[f"{side}_arm"] == pytest.approx(min(expected, 2.0))
+    assert found["left_arm"] > 1
+
+
+def test_doubt_about_an_arm_before_the_trunk_ends_where_its_colours_show_it():
+    states = followed(BARE, codes=True)
+    doubt, pose = MonocularDoubt(MonocularTracker(view(), make_settings("default"))), poses_of_arms(30)[-1]
+    mask = view().mask(pose)
+    seen = states[-1]._replace(pose=pose)
+    blind = seen._replace(observation=replace(seen.observation, arms=None))
+    hand = doubt.names.index("left_hand")
+    known, unknown = (doubt.evidence(state, mask, 0.0, None)[0].components for state in (seen, blind))
+    assert known["hidden"][hand, 0] < 0.3 * unknown["hidden"][hand, 0]
+    assert known["coloured"][hand, 0] < 0.1 < unknown["hidden"][hand, 0]
+    assert not unknown["coloured"].any()

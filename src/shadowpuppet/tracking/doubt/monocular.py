@@ -92,9 +92,10 @@ class MonocularDoubt:
         Axes are the camera's: x right, y down, z forward. Of every joint there are: a constant; the particles' spread across and along
         the view; the distance in depth to its mirror image, which draws the same silhouette (an arm before or behind the body, the trunk
         turned to the left or right); the error of depth by foreshortening; of its limb, the hidden share, the silhouette near it that
-        nothing explains, the share outside the silhouette and the share outside the picture, times the joint's lever; how far it
-        left its course; the misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; the
-        distances to the images of each arm, and of the trunk with both; and the error of the person's distance.
+        nothing explains, the share outside the silhouette and the share outside the picture, times the joint's lever; the same of what
+        does not match the arm's colours, if they are known, by which the hidden share is then multiplied; how far it left its course;
+        the misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; the distances to the
+        images of each arm, and of the trunk with both; and the error of the person's distance.
         """
         points = self.tracker.picture.points(state.pose[None])[0]
         at, lever = dict(zip(self.names, points)), levers_of(self.names)
@@ -106,6 +107,11 @@ class MonocularDoubt:
         observation = self.tracker.observe(mask, state.pose) if known is None else known
         images = self._mirrors.images(state.pose, points, observation)
         shares = self._shares(state.pose, points, mask, unpack(observation.ignore, mask.shape[1]))
+        arms = None if state.observation is None else state.observation.arms
+        mismatch = {} if arms is None else self.tracker.arm_colours.mismatch(arms, state.pose)
+        for limb, share in mismatch.items():  # its colours show an arm before the trunk
+            hidden, *others = shares[limb]
+            shares[limb] = (hidden * min(share, 1.0), *others)
         columns = np.array([shares.get(limb_of(name), (0.0,) * 4) for name in self.names]) * lever[:, None]
         found = dict(zip(("hidden", "unexplained", "outside", "cut"), columns.T)) | {
             "constant": np.full(len(points), CONSTANT),
@@ -118,6 +124,7 @@ class MonocularDoubt:
             "surprise": surprise(points, seconds, trail),
             "misfit": np.fmax(1 - state.overlap - GOOD_MISFIT, 0) * lever,
             "still": stillness(still) * lever,
+            "coloured": np.array([mismatch.get(limb_of(name), 0.0) for name in self.names]) * lever,
         }
         components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}
         components["alternative"] = images.displacements(points)

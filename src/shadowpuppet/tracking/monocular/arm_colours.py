@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.colour_codes import LEVELS, NUMBER, Codes, step_of, thinned
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.camera.rasterize import Bits, Picture, pack, unpack
+from shadowpuppet.camera.rasterize import Bits, Picture, count, pack, unpack
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.silhouette_cost import Observation, PartObservation
 
@@ -36,6 +36,8 @@ RARE = 1e-5
 """Added to every colour's frequency: one that is hardly seen says nothing."""
 NEIGHBOURS = 0.2
 """Share of a colour's pixels that each neighbour gets, along each channel, as noise and shading change a colour a little."""
+MOST_MISMATCH = 2.0
+"""Bound of the pixels that do not match an arm, over the arm's."""
 ABOUT_HEAD, ABOUT_ARMS, EDGE = 4, 3, 1
 """Bodies do not fit to the pixel: within the first distance (pixels at 320 x 240) of the head, whose skin may have the hands' colour, no
 pixel counts; within the others, of the arms and of other parts' edges, no colour is learnt."""
@@ -78,6 +80,18 @@ class ArmColours:
         found = found.repeat(step, 0).repeat(step, 1)[: mask.shape[0], : mask.shape[1]] & mask
         ignored = ignore | self.picture.leg_bits(pose) | pack(_grown(self._drawn(pose, "head"), ABOUT_HEAD * step))
         return PartObservation(Observation(pack(found) | ignored, ignored), tuple(self._names(kinds)))
+
+    def mismatch(self, seen: PartObservation, pose: Array) -> dict[str, float]:
+        """Of each arm in a pose (D,), the pixels of its parts that have other colours, and those of the arms' colours that neither arm
+        covers, over the first's number, at most `MOST_MISMATCH`; without arms whose parts do not count."""
+        counted, parts = ~seen.observation.ignore, self.picture.body.parts
+        which = {side: np.flatnonzero([part in seen.parts and part.startswith(side) for part in parts]) for side in SIDES}
+        drawn = {f"{side}_arm": self.picture.draw(pose, own) & counted for side, own in which.items()}
+        left, right = drawn.values()
+        found = seen.observation.silhouette & counted
+        over = count(found & ~(left | right))
+        areas = {arm: count(own) for arm, own in drawn.items()}
+        return {arm: min((count(own & ~found) + over) / areas[arm], MOST_MISMATCH) for arm, own in drawn.items() if areas[arm]}
 
     def _drawn(self, pose: Array, kind: str) -> Mask:
         """The parts of a kind in a pose (D,), as a mask (H, W)."""

@@ -102,7 +102,8 @@ class MonocularTracker:
         estimate, whole = last, self.observe(mask, last, also, state.unexplained)
         observation = whole if state.mask is None else whole.ignoring(mask & ~state.mask)
         if codes is not None and self.settings.arm_colours:
-            observation = replace(observation, arms=self.arm_colours.seen(state.colours, codes, mask, last, observation.ignore))
+            arms = self.arm_colours.seen(state.colours, codes, mask, last, observation.ignore)
+            whole, observation = replace(whole, arms=arms), replace(observation, arms=arms)
         narrow = self.settings.turned and self.is_narrow(mask, last)
         for cycle in range(self.settings.cycles):
             others = estimate  # values of the DOF outside a stage; later stages see the torso's new estimate, but not a limb's
