@@ -110,8 +110,8 @@ class MonocularDoubt:
         arms = None if state.observation is None else state.observation.arms
         mismatch = {} if arms is None else self.tracker.arm_colours.mismatch(arms, state.pose)
         for limb, share in mismatch.items():  # its colours show an arm before the trunk
-            hidden, *others = shares[limb]
-            shares[limb] = (hidden * min(share, 1.0), *others)
+            hidden, unexplained, outside, cut = shares[limb]
+            shares[limb] = (hidden * min(share, 1.0), unexplained, outside, cut)
         columns = np.array([shares.get(limb_of(name), (0.0,) * 4) for name in self.names]) * lever[:, None]
         found = dict(zip(("hidden", "unexplained", "outside", "cut"), columns.T)) | {
             "constant": np.full(len(points), CONSTANT),
