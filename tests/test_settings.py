@@ -151,7 +151,7 @@ def test_what_is_wrong_with_several_cameras_is_said(overrides, said):
 
 
 @pytest.mark.parametrize(("overrides", "said"), [
-    ({"particles": 3}, "unknown setting 'particles'; there are: arm, body, both_ways, cooling, cycles"),
+    ({"particles": 3}, "unknown setting 'particles'; there are: arm, arm_colours, body, both_ways, cooling, cycles"),
     ({"torso": {"particle": 3}}, "unknown setting 'torso.particle'; there are: particles, sigma_cost, sigma_rotation"),
     ({"arm": {"cycles": 3}}, "unknown setting 'arm.cycles'; there are: particles"),
     ({"torso": {"particles": 1}}, "torso.particles: found 1; input should be greater than or equal to 2"),

@@ -340,7 +340,7 @@ def test_a_run_can_be_made_again_from_its_own_file(shell, recording, run, tmp_pa
 
 @pytest.mark.parametrize(("text", "said"), [
     ("particles = 3", "mine.toml: unknown setting 'particles'; there are: anyway, appearance, background, body"),
-    ("[tracker]\narms = 3", "mine.toml: tracker: unknown setting 'arms'; there are: arm, body"),
+    ("[tracker]\narms = 3", "mine.toml: tracker: unknown setting 'arms'; there are: arm, arm_colours, body"),
     ("[tracker.arm]\nparticles = -3", "mine.toml: tracker: arm.particles: found -3"),
     ("seed = ", "mine.toml: not valid TOML"),
 ])  # fmt: skip
