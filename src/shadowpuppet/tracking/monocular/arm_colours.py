@@ -2,7 +2,9 @@
 
 A silhouette does not show where an arm is before the trunk; its colours do, be they a skin's or a glove's. They are counted where hands and
 forearms are beside the trunk, in the tracked poses, and compared with those of trunk and legs. If they differ, the pixels that have the
-arms' colours are a second silhouette, of these parts alone, and eq. 2 compares it with them as the first with the whole body.
+arms' colours are a second silhouette, of these parts alone, and eq. 2 compares it with them as the first with the whole body. It does not
+count beside the trunk: there it repeats what the silhouette shows, and an arm whose dark fingertips it lacks would be taken for one that
+points to the camera.
 
 No picture is kept, only how often each of 4096 coarse colours was seen.
 """
@@ -30,9 +32,6 @@ LIKELIER = 2.0
 """How much more frequent on arms than on trunk and legs the colours of an arm's pixels are, at least."""
 FOUND, MISTAKEN = 0.6, 0.1
 """Least share of a part's pixels with such colours, and greatest share of the trunk's and legs', if the part differs from these."""
-COMPLETE = 0.85
-"""Least share of the hands' pixels with such colours at which they count beside the trunk, too. There they repeat what the silhouette
-shows; if dark fingertips are missing, they shorten an arm, which is taken for one that points to the camera."""
 OVER_TRUNK, ABOUT_FOUND = 10, 20
 """Number of pixels, at 320 x 240, by which a part with the arms' colours reaches over the trunk, and distance (pixels) about it in which
 pixels count."""
@@ -74,21 +73,19 @@ class ArmColours:
 
     def seen(self, counts: ColourCounts | None, codes: Codes, mask: Mask, pose: Array, ignore: Bits) -> PartObservation | None:
         """The pixels of a mask (H, W) that have the arms' colours, and the parts that these are; None if the colours are not known, or do
-        not differ from those of trunk and legs. If they are not those of whole hands, only what is before the trunk counts. Pixels on the
-        head, and of an upper body those where its legs may be, both as in the last frame's `pose` (D,), do not count, nor do those in
-        `ignore`."""
+        not differ from those of trunk and legs. Only what is before the trunk counts; not the head, nor where an upper body's legs may be,
+        all as in the last frame's `pose` (D,); nor pixels in `ignore`."""
         if counts is None:
             return None
-        colours = distinct(counts, "hand" if len(self._shapes["hand"]) else "forearm")
-        if colours is None:
+        kinds, of_arms = distinct(counts, "hand" if len(self._shapes["hand"]) else "forearm")
+        if not kinds:
             return None
         step = step_of(self.picture.camera.size)
-        found = _grown(_grown(colours.of_arms[codes] & thinned(mask), -1), 1)  # without single pixels
+        found = _grown(_grown(of_arms[codes] & thinned(mask), -1), 1)  # without single pixels
         found = found.repeat(step, 0).repeat(step, 1)[: mask.shape[0], : mask.shape[1]] & mask
-        if not colours.complete:
-            ignore = ignore | ~pack(self._before_trunk(found, pose, step))
-        ignored = ignore | self.picture.leg_bits(pose) | pack(_grown(self._drawn(pose, "head"), ABOUT_HEAD * step))
-        return PartObservation(Observation(pack(found) | ignored, ignored), tuple(self._names(colours.kinds)))
+        apart = _grown(self._drawn(pose, "head"), ABOUT_HEAD * step) | ~self._before_trunk(found, pose, step)
+        ignored = ignore | pack(apart) | self.picture.leg_bits(pose)
+        return PartObservation(Observation(pack(found) | ignored, ignored), tuple(self._names(kinds)))
 
     def _before_trunk(self, found: Mask, pose: Array, step: int) -> Mask:
         """The trunk of a pose (D,), and what is about the parts of a mask (H, W) that reach over it."""
@@ -137,23 +134,12 @@ def kind_of(part: str) -> str:
     return name if name in KINDS else "rest"
 
 
-class Colours(NamedTuple):
-    """Colours of arms that differ from those of trunk and legs."""
-
-    kinds: tuple[str, ...]
-    """Of the parts that have them."""
-    of_arms: NDArray[np.bool_]
-    """Whether each colour (4096,) is theirs."""
-    complete: bool
-    """Whether they are those of nearly all pixels of hands."""
-
-
-def distinct(counts: ColourCounts, outermost: str = "hand") -> Colours | None:
-    """The colours of arms as counted; None if those of the arm's `outermost` kind of part do not differ: an arm's place is known by its
-    end."""
+def distinct(counts: ColourCounts, outermost: str = "hand") -> tuple[tuple[str, ...], NDArray[np.bool_]]:
+    """The kinds of parts whose colours differ from those of trunk and legs, and whether each colour (4096,) is theirs. No kinds if the
+    arm's `outermost` does not differ: an arm's place is known by its end."""
     if counts.rest.sum() < ENOUGH_REST:
-        return None
-    rest, kinds, sum_of_kinds, shares = _frequencies(counts.rest), list[str](), np.zeros(NUMBER), dict[str, float]()
+        return (), np.zeros(0, bool)
+    rest, kinds, sum_of_kinds = _frequencies(counts.rest), list[str](), np.zeros(NUMBER)
     for kind in ("hand", "forearm"):
         number = getattr(counts, kind)
         if number.sum() < ENOUGH:
@@ -163,10 +149,9 @@ def distinct(counts: ColourCounts, outermost: str = "hand") -> Colours | None:
         if own[likelier].sum() > FOUND and rest[likelier].sum() < MISTAKEN:
             kinds.append(kind)
             sum_of_kinds += own
-            shares[kind] = own[likelier].sum()
     if outermost not in kinds:
-        return None
-    return Colours(tuple(kinds), sum_of_kinds / len(kinds) + RARE > LIKELIER * (rest + RARE), shares[outermost] > COMPLETE)
+        return (), np.zeros(0, bool)
+    return tuple(kinds), sum_of_kinds / len(kinds) + RARE > LIKELIER * (rest + RARE)
 
 
 def _frequencies(numbers: NDArray[np.int64]) -> Array:
