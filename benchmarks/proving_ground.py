@@ -1,11 +1,12 @@
 """The proving ground: settings of the one-camera tracker on made recordings, bodies x motions x cameras x noise, to choose them by.
 
-    python benchmarks/proving_ground.py [--rows default,liu2011] [--seeds 2] [--each] [--markdown FILE] [--picture FILE] [--workers 2]
+    python benchmarks/proving_ground.py [--rows default,liu2011] [--seeds 2] [--each] [--shift 500] [--markdown FILE] [--picture FILE]
 
 The recordings (`synthetic.proving_ground`) are made where they are missing, some 5 s each, in build/proving_ground. From video, sizes from
 the references, as `shadowpuppet track` does it. A row is a choice of settings; the table has its means over recordings and seeds, and
 `se`, the standard error of the mean error against the first row's, in pairs of the same recording and seed: differences within
-two of them are not significant. `--picture` draws error against time for the rows of `TRADE`.
+two of them are not significant. `--shift 500`: other people, clothes and rooms, on which no setting was chosen. `--picture` draws error
+against time for the rows of `TRADE`.
 """
 
 from __future__ import annotations
@@ -62,15 +63,15 @@ ROWS: dict[str, dict[str, Any]] = {
 """Each a default with something changed."""
 
 
-def made(folder: Path, names: Iterable[str] = ()) -> list[Path]:
-    """Folders of the recordings, or of those named; made where they are missing."""
+def made(folder: Path, names: Iterable[str] = (), shift: int = 0) -> list[Path]:
+    """Folders of the recordings, or of those named; made where they are missing. `shift`: see `proving_ground`."""
     wanted, out = set(names), []
-    for n, spec in enumerate(proving_ground()):
+    for n, spec in enumerate(proving_ground(shift)):
         if wanted and spec.name not in wanted:
             continue
         out.append(folder / spec.name)
         if not (done := out[-1] / "made").exists():
-            synthesize(spec, out[-1], np.random.default_rng([0, n]))
+            synthesize(spec, out[-1], np.random.default_rng([shift, n]))
             done.touch()
     return out
 
@@ -165,7 +166,8 @@ def main() -> None:
     parser.add_argument("--rows", default="default;liu2011", help="names, with ; between them: " + "; ".join(ROWS))
     parser.add_argument("--recordings", default="", help="names, with ; between them; all without")
     parser.add_argument("--seeds", type=int, default=2)
-    parser.add_argument("--folder", type=Path, default=HERE, help="where the recordings are, or are made")
+    parser.add_argument("--shift", type=int, default=0, help="other people, clothes and rooms, which no setting was chosen on")
+    parser.add_argument("--folder", type=Path, help="where the recordings are, or are made")
     parser.add_argument("--each", action="store_true", help="print every recording's error, too")
     parser.add_argument("--markdown", type=Path, help="write the tables there too")
     parser.add_argument("--json", type=Path, help="write all measures there")
@@ -176,7 +178,8 @@ def main() -> None:
     unknown = [row for row in chosen if row not in ROWS]
     if unknown:
         parser.error(f"unknown row {unknown[0]!r}; there are: {'; '.join(ROWS)}")
-    paths = made(args.folder, filter(None, args.recordings.split(";")))
+    folder = args.folder or (HERE / str(args.shift) if args.shift else HERE)
+    paths = made(folder, filter(None, args.recordings.split(";")), args.shift)
     found = prove(paths, {row: ROWS[row] for row in dict.fromkeys(chosen)}, args.seeds, args.workers)
     text = "\n\n".join([table(found), *([each(found)] if args.each else [])])
     print(text)

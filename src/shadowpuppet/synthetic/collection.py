@@ -53,21 +53,23 @@ PROVING = (
 )
 
 
-def proving_ground() -> tuple[Spec, ...]:
+def proving_ground(shift: int = 0) -> tuple[Spec, ...]:
     """Recordings of one camera on which settings are chosen: bodies x motions x cameras x noise, about ten seconds each.
 
     They are fixed; make the n-th with `numpy.random.default_rng([seed, n])`, its own seed being (0, n). Level cameras stand at 0.9 of the
-    stature, so that the picture cuts the legs; pitched ones higher or lower, so that the person stays in the picture.
+    stature, so that the picture cuts the legs; pitched ones higher or lower, so that the person stays in the picture. With a `shift` they
+    have other people, clothes and rooms, to test on what was chosen; their seeds are (shift, n).
     """
-    return tuple(_proof(n, *row) for n, row in enumerate(PROVING))
+    return tuple(_proof(n, shift, *row) for n, row in enumerate(PROVING))
 
 
-def _proof(n: int, name: str, kind, seed: int, gestures: str, distance: float, fov: float, pitch: float, noise: float, turn: float) -> Spec:
-    body = Mannequin.draw(np.random.default_rng(seed), kind)
+def _proof(n: int, shift: int, name: str, kind, seed: int, gestures: str, distance: float, fov: float, pitch: float, noise: float,
+           turn: float) -> Spec:
+    body = Mannequin.draw(np.random.default_rng(seed + shift), kind)
     height = 0.9 * body.stature + distance * float(np.tan(np.radians(pitch)))
     view = Viewpoint(fov_deg=fov, height=height, distance=distance, pitch_deg=pitch)
-    return Spec(name=name, body=body, motion=parse_gestures(gestures), cameras=(view,), scene=Scene(clothing=n, room=n, noise=noise),
-                turn_deg=turn, seed=(0, n))
+    return Spec(name=name, body=body, motion=parse_gestures(gestures), cameras=(view,), turn_deg=turn,
+                scene=Scene(clothing=n + shift, room=n + shift, noise=noise), seed=(shift, n))
 
 
 def _person(kind: Kind, seed: int, bmi: float | None = None, age: float | None = None) -> Mannequin:
