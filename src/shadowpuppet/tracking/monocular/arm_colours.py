@@ -92,7 +92,7 @@ class ArmColours:
         import cv2
 
         trunk = self._drawn(pose, "rest")
-        _, labels = cv2.connectedComponents(found.view(np.uint8))
+        labels = cv2.connectedComponents(found.view(np.uint8))[1].astype(np.int64)
         over = np.bincount(labels[trunk & found], minlength=labels.max() + 1) >= OVER_TRUNK * step**2
         return trunk | _grown(over[labels], ABOUT_FOUND * step)
 
