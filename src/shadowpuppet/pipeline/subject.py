@@ -109,7 +109,7 @@ class TrackedSubject(ABC):
         return False
 
     def turned_back(self, state: Any) -> TrackedSubject:
-        """The subject that tracks a film backward after it has been tracked forward to a state, of which it keeps what it has learnt."""
+        """The subject for tracking a film backward, with what the last state of the forward pass has learnt."""
         return self
 
     def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:

@@ -92,8 +92,9 @@ class ArmColours:
         import cv2
 
         trunk = self._drawn(pose, "rest")
-        labels = cv2.connectedComponents(found.view(np.uint8))[1].astype(np.int64)
-        over = np.bincount(labels[trunk & found], minlength=labels.max() + 1) >= OVER_TRUNK * step**2
+        number, parts = cv2.connectedComponents(found.view(np.uint8))
+        labels = np.asarray(parts, np.intp)
+        over = np.bincount(labels[trunk & found], minlength=number) >= OVER_TRUNK * step**2
         return trunk | _grown(over[labels], ABOUT_FOUND * step)
 
     def mismatch(self, seen: PartObservation, pose: Array) -> dict[str, float]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 
 from shadowpuppet.body.segments import dofs_of, keep_limb_directions, limbs_of, parts_of, segments_of
@@ -35,6 +33,7 @@ class FilterStage:
         hide = self.parts == ("torso",) and settings.torso_arms == "hidden"
         arms = [part for arm in ("left_arm", "right_arm") for part in parts_of(picture.body, arm)]
         self.partial = PartialCost(picture, self.dofs, arms if hide else ())
+        self._partials = dict[tuple[str, ...], PartialCost]()  # of some of the arms' parts alone
 
         table = {part: settings.torso if part == "torso" else settings.arm for part in self.parts}  # columns of Table I
         self.number = sum(part.particles for part in table.values())
@@ -95,11 +94,6 @@ class FilterStage:
         if seen.parts not in self._partials:
             self._partials[seen.parts] = PartialCost(self.picture, self.dofs, set(self.picture.body.parts) - set(seen.parts))
         return [self._partials[seen.parts].costs(seen.observation, others)]
-
-    @cached_property
-    def _partials(self) -> dict[tuple[str, ...], PartialCost]:
-        """By the parts that are drawn."""
-        return {}
 
     def estimate(self, particles: Particles) -> Array:
         """The stage's estimate: values (d,) of the particle of least cost."""
