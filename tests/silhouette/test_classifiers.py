@@ -105,9 +105,9 @@ def test_classify_is_its_naive_twin(seed, keyed, darkest, asked):
 @pytest.mark.kernels
 def test_contrast_and_neighbours_are_their_naive_twins(rng):
     planes, mean = rng.integers(0, 256, (9, 7, 3), dtype=np.uint8), rng.uniform(0, 255, (9, 7, 3)).astype(np.float32)
-    out, seen = np.empty((9, 7), np.float32), np.array([1, 0.5, 0], np.float32)
-    contrast(planes, mean, seen, out)
-    np.testing.assert_allclose(out, np.sqrt(((planes - mean) ** 2 * seen).sum(-1)), rtol=1e-5)
+    out, seen, where = np.empty((9, 7), np.float32), np.array([1, 0.5, 0], np.float32), rng.integers(0, 2, (9, 7), dtype=np.uint8)
+    contrast(planes, mean, seen, where, out)
+    np.testing.assert_allclose(out, np.sqrt(((planes - mean) ** 2 * seen).sum(-1)) * where, rtol=1e-5)
     samples, far = rng.integers(0, 40, (5, 9, 7, 3), dtype=np.uint8), np.empty((9, 7), np.uint8)
     far_from_samples(planes // 6, samples, 400, 2, far)
     near = (((planes // 6).astype(int) - samples.astype(int)) ** 2).sum(-1) <= 400
@@ -182,7 +182,7 @@ def test_the_outline_lies_at_half_contrast_however_far_the_first_mask_reaches(bl
     exact, seen = blurred_disc(25, blur, strength)
     first = cv2.dilate(exact.astype(np.uint8), np.ones((2 * grown + 1, 2 * grown + 1), np.uint8))
     width = max(SHARP_WIDTH, round(2 * blur)) + grown
-    found = at_half_contrast(first, seen, EdgeProfile(width, 6)) > 0
+    found = at_half_contrast(first, lambda where: seen, EdgeProfile(width, 6)) > 0
     offset = (np.count_nonzero(found & ~exact) - np.count_nonzero(exact & ~found)) / (2 * np.pi * 25)
     assert abs(offset) < 0.15
 
@@ -211,9 +211,9 @@ def test_stripes_of_clothes_are_not_taken_for_blur_wider_than_half_an_arm(rng):
     contrast = np.float32(mask * (20 + 12 * np.minimum(depth, 8)))
     width = outline_width([(mask, contrast)])
     assert SHARP_WIDTH <= width <= np.ceil(LIMB_WIDTH_SHARE * np.sqrt(mask.sum()))
-    arm = at_half_contrast(mask, contrast, EdgeProfile(width, 6))[22:26, 10:28]
+    arm = at_half_contrast(mask, lambda where: contrast, EdgeProfile(width, 6))[22:26, 10:28]
     assert arm.all()
-    assert not at_half_contrast(mask, contrast, EdgeProfile(6, 6))[22:26, 10:28].all()  # what it would be without
+    assert not at_half_contrast(mask, lambda where: contrast, EdgeProfile(6, 6))[22:26, 10:28].all()  # what it would be without
 
 
 def test_a_blurred_film_is_known_by_a_person_whom_the_border_cuts(thick):
@@ -228,7 +228,7 @@ def test_fingertips_stay_and_bled_gaps_open():
     mask[10:50, 10:40] = mask[30, 40:50] = 1
     contrast = 100 * mask.astype(np.float32)
     contrast[12:48, 24:27] = 10  # a gap, with the colour that the codec bled into it
-    found = at_half_contrast(mask, contrast, EdgeProfile(SHARP_WIDTH, 6)) > 0
+    found = at_half_contrast(mask, lambda where: contrast, EdgeProfile(SHARP_WIDTH, 6)) > 0
     assert found[30, 40:50].all()
     assert not found[14:46, 24:27].any()
     assert found[12:48, 12:22].all()
@@ -239,7 +239,7 @@ def test_where_the_border_cuts_a_person_nothing_is_taken_off():
     mask[10:, 10:30] = 1
     contrast = 100 * mask.astype(np.float32)
     contrast[-1, 10:30] = 40
-    assert at_half_contrast(mask, contrast, EdgeProfile(SHARP_WIDTH, 6))[-1, 12:28].all()
+    assert at_half_contrast(mask, lambda where: contrast, EdgeProfile(SHARP_WIDTH, 6))[-1, 12:28].all()
 
 
 def test_the_border_of_the_picture_is_no_outline(rng):

@@ -43,10 +43,14 @@ def classify(planes, within, mean, inverse_sigma, keyed, shadowed, darkest, aske
 
 
 @compiled(nogil=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
-def contrast(planes, mean, seen, out):
-    """Euclidean difference (H, W), grey levels, of `planes` uint8 and `mean` float32 (H, W, 3) in the channels of `seen` (3,)."""
+def contrast(planes, mean, seen, where, out):
+    """Euclidean difference (H, W), grey levels, of `planes` uint8 and `mean` float32 (H, W, 3) in the channels of `seen` (3,), where `where`
+    (H, W) is not 0; 0 elsewhere."""
     for y in range(planes.shape[0]):
         for x in range(planes.shape[1]):
+            if not where[y, x]:
+                out[y, x] = 0
+                continue
             d0 = np.float32(planes[y, x, 0]) - mean[y, x, 0]
             d1 = np.float32(planes[y, x, 1]) - mean[y, x, 1]
             d2 = np.float32(planes[y, x, 2]) - mean[y, x, 2]
@@ -74,11 +78,14 @@ def outlined(contrast, inner, wide, total, number, greatest, least, shares, foun
     at_outline, bled, whole, weight = shares
     for y in range(contrast.shape[0]):
         for x in range(contrast.shape[1]):
+            if not wide[y, x]:
+                found[y, x] = full[y, x] = 0
+                continue
             peak, here = greatest[y, x], contrast[y, x]
             mean = min(total[y, x] / max(number[y, x], np.float32(1)), peak) if number[y, x] > np.float32(0.5) else peak
             around = weight * peak + (np.float32(1) - weight) * mean
             core = inner[y, x] > 0 and here >= min(bled * around, np.float32(2) * least)
-            rim = wide[y, x] > 0 and here >= max(at_outline * around, least)
+            rim = here >= max(at_outline * around, least)
             found[y, x] = np.uint8(core or rim)
             full[y, x] = np.uint8((core or rim) and here > whole * around)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -51,8 +51,8 @@ class EdgeProfile(NamedTuple):
     """Least contrast of a pixel on the outline, grey levels."""
 
 
-def at_half_contrast(mask: Labels, contrast: Contrast, outline: EdgeProfile) -> Labels:
-    """Move the outline to where the contrast is half of that further inside.
+def at_half_contrast(mask: Labels, contrast: Callable[[Labels], Contrast], outline: EdgeProfile) -> Labels:
+    """Move the outline of a mask (H, W) to where the contrast is half of that further inside; `contrast` is asked for pixels (H, W) alone.
 
     Blur and compression mix person and background over some pixels; a fixed threshold would put outlines of strong contrast too far
     outside and those of weak contrast too far inside.
@@ -61,16 +61,21 @@ def at_half_contrast(mask: Labels, contrast: Contrast, outline: EdgeProfile) -> 
 
     from shadowpuppet.silhouette._kernels import inside, outlined
 
-    inner = np.asarray(cv2.erode(mask, disc(outline.width), borderValue=1), np.uint8)
-    deep, within = np.empty_like(contrast), np.empty_like(contrast)
-    inside(contrast, inner, mask, deep, within)
+    inner, wide = np.asarray(cv2.erode(mask, disc(outline.width), borderValue=1), np.uint8), cv2.dilate(mask, disc(OUTWARD_REACH))
+    here = contrast(np.asarray(wide, np.uint8))
+    deep, within = np.empty_like(here), np.empty_like(here)
+    inside(here, inner, mask, deep, within)
     side = 2 * (outline.width + SURROUND_MARGIN) + 1
     total, number = (cv2.boxFilter(values, cv2.CV_32F, (side, side), normalize=False) for values in (deep, inner))
     greatest = cv2.dilate(within, np.ones((2 * outline.width + 1,) * 2, np.uint8))
     found, full = np.empty_like(mask), np.empty_like(mask)
-    wide, least = cv2.dilate(mask, disc(OUTWARD_REACH)), np.float32(outline.least)
-    outlined(contrast, inner, wide, total, number, greatest, least, SHARES, found, full)
+    outlined(here, inner, wide, total, number, greatest, np.float32(outline.least), SHARES, found, full)
     return np.asarray(cv2.medianBlur(found, 3), np.uint8) | full
+
+
+def outline_reach(outline: EdgeProfile) -> int:
+    """Distance (pixels) from a changed pixel of a mask, to the sides, up to which `at_half_contrast` may differ."""
+    return 2 * outline.width + SURROUND_MARGIN + 1
 
 
 def outline_width(people: Iterable[tuple[Labels, Contrast]]) -> int:

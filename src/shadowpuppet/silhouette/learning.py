@@ -136,6 +136,6 @@ def _outline_width(segmenter: Segmenter, frames: list[Image]) -> int:
         """The person and the contrast in the rows and columns around them: what is beyond says nothing about the outline."""
         mask = coarse_person(segmenter.classifier(frame))
         window = bounding_window(mask, 1)
-        return mask[window], segmenter.contrast(frame, window)
+        return mask[window], segmenter.contrast(frame, window, mask[window])
 
     return outline_width(person for person in map(cut, frames) if person[0].any())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -13,12 +13,10 @@ from numpy.typing import NDArray
 from shadowpuppet.silhouette.background import Background, Image, check_alike, check_image, to_planes
 from shadowpuppet.silhouette.boundary import Contrast, EdgeProfile, Labels
 from shadowpuppet.silhouette.classifiers import METHODS, AveragingClassifier, ChannelClassifier, Classifier
-from shadowpuppet.silhouette.cleanup import Window, clean
+from shadowpuppet.silhouette.cleanup import Cleaned, Window, clean
 from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.correction.registration import Gap
 from shadowpuppet.silhouette.settings import SilhouetteSettings
-
-WHOLE_IMAGE: Window = (slice(None), slice(None))
 
 
 class Labelled(NamedTuple):
@@ -101,9 +99,11 @@ class Segmenter:
     def segmented(self, labelled: Labelled) -> Segmented:
         """The silhouette that step 4 makes of a frame after step 3."""
         def with_limbs(limbs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-            return mask | self.finished(labelled._replace(label=np.where(limbs, np.maximum(labelled.label, 1), labelled.label)))
+            label = np.where(limbs, np.maximum(labelled.label, 1), labelled.label)
+            return mask | self._filled(self._cleaned(labelled._replace(label=label), cleaned).person, labelled.gap)
 
-        mask = self.finished(labelled)
+        cleaned = self._cleaned(labelled)
+        mask = self._filled(cleaned.person, labelled.gap)
         if labelled.shadow is None:
             return Segmented(mask, image=labelled.image)
         return Segmented(mask, labelled.shadow, with_limbs, labelled.image)
@@ -124,10 +124,18 @@ class Segmenter:
 
     def finished(self, labelled: Labelled) -> NDArray[np.bool_]:
         """The mask (H, W) that step 4 makes of it."""
-        image, label, gap, _ = labelled
-        if self.settings.cleaned:
-            label = clean(label, lambda window: self.contrast(image, window), self.edge, self.several)
-        mask = label > 0 if self.covered is None else (label > 0) | self.covered
+        return self._filled(self._cleaned(labelled).person, labelled.gap)
+
+    def _cleaned(self, labelled: Labelled, like: Cleaned | None = None) -> Cleaned:
+        """The cleaned-up frame; as it is if it is not to be cleaned up. `like`: see `clean`."""
+        label = labelled.label
+        if not self.settings.cleaned:
+            return Cleaned(label, label, label)
+        return clean(label, partial(self.contrast, labelled.image), self.edge, self.several, like)
+
+    def _filled(self, person: Labels, gap: Gap | None) -> NDArray[np.bool_]:
+        """The mask (H, W) of a person (H, W), with pixels that the person always covers, or that a moved camera does not show."""
+        mask = person > 0 if self.covered is None else (person > 0) | self.covered
         return mask if gap is None else gap.filled(mask)
 
     def raw(self, image: Image) -> NDArray[np.bool_]:
@@ -142,13 +150,14 @@ class Segmenter:
     def _averaging(self) -> AveragingClassifier:
         return AveragingClassifier.of_background(self.background, self.settings.factor)
 
-    def contrast(self, image: Image, window: Window = WHOLE_IMAGE) -> Contrast:
-        """Difference to the background (H, W) in the method's channels, grey levels, in a window of rows and columns."""
+    def contrast(self, image: Image, window: Window, where: Labels) -> Contrast:
+        """Difference to the background (h, w) in the method's channels, grey levels, in a window of rows and columns; 0 where `where` (h, w)
+        is 0."""
         from shadowpuppet.silhouette._kernels import contrast
 
         planes = to_planes(np.ascontiguousarray(image[window]))
         out = np.empty(planes.shape[:2], np.float32)
-        contrast(planes, self.background.mean[window], np.array(METHODS[self.key].contrast, np.float32), out)
+        contrast(planes, self.background.mean[window], np.array(METHODS[self.key].contrast, np.float32), where, out)
         return out
 
     def _check(self, image: Image) -> None:

@@ -105,17 +105,13 @@ def _rarities(joints, means, precisions, offsets, uniform, greatest, out):  # pr
     """Fill `out` (N,) as `ArmPostures.rarity_of_both`; `offsets` (K,): each component's log density at its mean."""
     for n in range(joints.shape[0]):
         at = joints[n]
-        ux, uy, uz = _unit(at[1, 0] - at[0, 0], at[1, 1] - at[0, 1], at[1, 2] - at[0, 2])
-        ax, ay, az = at[5, 0] - at[2, 0], at[5, 1] - at[2, 1], at[5, 2] - at[2, 2]
-        along = ax * ux + ay * uy + az * uz
-        rx, ry, rz = _unit(ax - along * ux, ay - along * uy, az - along * uz)
-        fx, fy, fz = uy * rz - uz * ry, uz * rx - ux * rz, ux * ry - uy * rx
+        rx, ry, rz, fx, fy, fz, ux, uy, uz = trunk_axes(at[0], at[1], at[2], at[5])
         out[n] = 0.0
         for side in range(2):
             j, mirrored = 2 + 3 * side, 2.0 * side - 1.0
-            x, y, z = _unit(at[j + 1, 0] - at[j, 0], at[j + 1, 1] - at[j, 1], at[j + 1, 2] - at[j, 2])
+            x, y, z = direction(at[j], at[j + 1])
             a, b, c = mirrored * (rx * x + ry * y + rz * z), fx * x + fy * y + fz * z, ux * x + uy * y + uz * z
-            x, y, z = _unit(at[j + 2, 0] - at[j + 1, 0], at[j + 2, 1] - at[j + 1, 1], at[j + 2, 2] - at[j + 1, 2])
+            x, y, z = direction(at[j + 1], at[j + 2])
             d, e, f = mirrored * (rx * x + ry * y + rz * z), fx * x + fy * y + fz * z, ux * x + uy * y + uz * z
             density = uniform
             for k in range(means.shape[0]):
@@ -135,6 +131,22 @@ def log_added(first, second):  # pragma: no cover
     """Logarithm of the sum of two numbers, from their logarithms."""
     high, low = max(first, second), min(first, second)
     return high + np.log1p(np.exp(low - high))
+
+
+@device
+def trunk_axes(pelvis, neck, left_shoulder, right_shoulder):  # pragma: no cover
+    """The rows of `trunk_frame` (3, 3), one after another, from joints (3,)."""
+    ux, uy, uz = direction(pelvis, neck)
+    ax, ay, az = right_shoulder[0] - left_shoulder[0], right_shoulder[1] - left_shoulder[1], right_shoulder[2] - left_shoulder[2]
+    along = ax * ux + ay * uy + az * uz
+    rx, ry, rz = _unit(ax - along * ux, ay - along * uy, az - along * uz)
+    return rx, ry, rz, uy * rz - uz * ry, uz * rx - ux * rz, ux * ry - uy * rx, ux, uy, uz
+
+
+@device
+def direction(start, end):  # pragma: no cover
+    """Unit vector from one place (3,) to another."""
+    return _unit(end[0] - start[0], end[1] - start[1], end[2] - start[2])
 
 
 @device

@@ -16,7 +16,7 @@ import numpy as np
 
 from shadowpuppet.geometry import Array, unit
 from shadowpuppet.jit import device, kernel
-from shadowpuppet.tracking.multiview.arm_postures import log_added, trunk_frame
+from shadowpuppet.tracking.multiview.arm_postures import direction, log_added, trunk_axes, trunk_frame
 
 TABLE = "body_postures.npz"
 """The mixture, as `benchmarks/fit_body_postures.py` writes it."""
@@ -76,9 +76,8 @@ class BodyPostures:
     def rarity_of(self, joints: Array) -> Array:
         """`rarity` (N,) of `body_directions` of `JOINTS` (N, 14, 3), by a kernel."""
         out = np.empty(len(joints))
-        directions = body_directions(joints)
         factors, offsets = self._constants
-        _rarities(directions, mirrored(directions), self.means, factors, offsets, self._usual, out)
+        _rarities(joints, self.means, factors, offsets, self._usual, np.empty((2, D)), out)
         return out
 
     @cached_property
@@ -104,14 +103,31 @@ def usual_body_postures() -> BodyPostures:
 
 
 @kernel
-def _rarities(directions, others, means, factors, offsets, usual, out):  # pragma: no cover
-    """Fill `out` (N,) as `BodyPostures.rarity`; `others` (N, 27): the directions mirrored."""
-    for n in range(directions.shape[0]):
+def _rarities(joints, means, factors, offsets, usual, work, out):  # pragma: no cover
+    """Fill `out` (N,) as `BodyPostures.rarity_of`; `work` (2, 27): room for a pose's directions, as they are and mirrored."""
+    for n in range(joints.shape[0]):
+        _fill_directions(joints[n], work)
         density = usual - FLOOR
         for k in range(means.shape[0]):
-            density = log_added(density, _log_part(directions[n], means[k], factors[k], offsets[k], density - NEGLIGIBLE))
-            density = log_added(density, _log_part(others[n], means[k], factors[k], offsets[k], density - NEGLIGIBLE))
+            for which in range(2):
+                density = log_added(density, _log_part(work[which], means[k], factors[k], offsets[k], density - NEGLIGIBLE))
         out[n] = usual - density
+
+
+@kernel
+def _fill_directions(at, out):  # pragma: no cover
+    """Fill `out` (2, 27) with `body_directions` of `JOINTS` (14, 3), and with the mirrored ones."""
+    rx, ry, rz, fx, fy, fz, ux, uy, uz = trunk_axes(at[0], at[1], at[2], at[8])
+    for bone in range(D // 3):
+        if bone < 8:
+            start = 2 + 3 * (bone // 2) + bone % 2
+            x, y, z = direction(at[start], at[start + 1])
+            other = (bone + 4) % 8  # the other side's
+        else:
+            x, y, z, other = 0.0, 0.0, 1.0, bone
+        right, forward, up = rx * x + ry * y + rz * z, fx * x + fy * y + fz * z, ux * x + uy * y + uz * z
+        out[0, 3 * bone], out[0, 3 * bone + 1], out[0, 3 * bone + 2] = right, forward, up
+        out[1, 3 * other], out[1, 3 * other + 1], out[1, 3 * other + 2] = -right, forward, up
 
 
 @device

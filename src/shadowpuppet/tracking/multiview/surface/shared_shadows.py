@@ -6,7 +6,7 @@ no silhouette in any of them, so that its rays do not.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +26,6 @@ silhouette's area: about a forearm's width, and a sixth of it on each side."""
 LEAST_LENGTH, LIMB_LENGTH = 0.03, 0.08
 """Least length (m) of a ray's part within all other silhouettes, and the length that one ray of a limb has: an ankle's thickness. A shadow
 beside a foot has shorter parts only."""
-ALONG = (0.25, 0.5, 0.75)
-"""Places along such a part: at least one must lie inside the silhouettes, within the pictures, of all other cameras."""
 
 
 class SharedShadows:
@@ -61,7 +59,7 @@ def shaded_limbs(hull: VisualHull, masks: Sequence[Mask | None], shadows: Sequen
     if not sum(map(len, tried)):
         return {}
     camera, pixels = np.repeat(np.array(list(known)), [*map(len, tried)]), np.concatenate(tried)
-    length = _shared(hull, people, camera, pixels.astype(float))
+    length = hull.lengths_inside(people, camera, pixels.astype(float))
     found = length >= LEAST_LENGTH
     limbs = {n: _limbs(pixels[of_one := found & (camera == n)], length[of_one], known[n], pitch[n])
              for n in np.unique(camera[length >= LIMB_LENGTH]).tolist()}
@@ -74,30 +72,10 @@ def _grid(shadow: Mask, pitch: int) -> NDArray[np.int64]:
     return pitch * np.stack([x, y], 1)
 
 
-def _shared(hull: VisualHull, people: Mapping[int, Mask], camera: NDArray[np.int64], pixels: Array) -> Array:
-    """Length (m) of the longest part of each ray, of pixels (P, 2) of cameras (P,), that all others of `people` see as the person, (P,)."""
-    ray, ends = hull.inside(people, camera, pixels)
-    places = np.stack([ends[:, 0] + along * (ends[:, 1] - ends[:, 0]) for along in ALONG], 1)
-    seen = np.ones(places.shape[:2], bool)
-    for n, mask in people.items():
-        seen &= (camera[ray] == n)[:, None] | _covers(mask, hull.cameras[n].project(places))
-    out = np.zeros(len(pixels))
-    np.maximum.at(out, ray, np.where(seen.any(1), np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), 0.0))
-    return out
-
-
-def _covers(mask: Mask, pixels: Array) -> NDArray[np.bool_]:
-    """Whether a mask (H, W) has the pixels (..., 2); not outside the picture, or where they are not a number."""
-    at = np.where(np.isfinite(pixels), pixels, -1.0).round().clip(-1, 2**31 - 1).astype(np.int64)
-    x, y = at[..., 0], at[..., 1]
-    within = (x >= 0) & (y >= 0) & (x < mask.shape[1]) & (y < mask.shape[0])
-    return within & mask[np.where(within, y, 0), np.where(within, x, 0)]
-
-
 def _limbs(pixels: NDArray[np.int64], lengths: Array, shadow: Mask, pitch: int) -> Mask:
     """The parts of `shadow` (H, W) around found pixels (P, 2) of the grid that are not thin and have a ray of at least a limb's length.
 
-    lengths: of the pixels' rays (P,), as `_shared` has them.
+    lengths: of the parts of the pixels' rays (P,) within all other silhouettes, metres.
     """
     import cv2
 

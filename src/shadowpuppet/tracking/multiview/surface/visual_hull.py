@@ -119,19 +119,20 @@ class VisualHull:
                  for n, (mask, camera) in enumerate(zip(masks, self.cameras)) if mask is not None}
         return {n: mask for n, mask in given.items() if may_be_person(mask)}
 
-    def inside(self, people: Mapping[int, Mask], camera: NDArray[np.int64], pixels: Array) -> tuple[NDArray[np.int64], Array]:
-        """The parts of viewing rays that the silhouettes of all other cameras leave.
+    def lengths_inside(self, people: Mapping[int, Mask], camera: NDArray[np.int64], pixels: Array) -> Array:
+        """Lengths (P,), metres, of the longest part of each viewing ray that is inside the silhouettes of all other cameras, with its middle
+        in all of their pictures; 0 where there is none.
 
-        people: masks (H, W) by the camera's index, in order. camera, pixels: the rays, as pixels (P, 2) of cameras (P,), by index. Returns
-        the index (E,) of each part's ray, and the part's ends (E, 2, 3), world, metres. What a camera does not show it does not carve.
+        people: masks (H, W) by the camera's index, in order. camera, pixels: the rays, as pixels (P, 2) of cameras (P,), by index.
         """
         which, rays = np.array(list(people)), np.zeros((len(pixels), 3))
         for n in people:
             rays[camera == n] = self.cameras[n].rays(pixels[camera == n])
         carving = self._carving([_silhouette(mask, self._views[n]) for n, mask in people.items()], which)
-        ray, depths = cut_rays(np.searchsorted(which, camera), rays, *carving)
-        back = inverse(self._T)[camera[ray]]
-        return ray, np.einsum("eij,ekj->eki", back[:, :3, :3], rays[ray, None] * depths[..., None]) + back[:, None, :3, 3]
+        ray, depths = cut_rays(np.searchsorted(which, camera), rays, *carving, witnesses=len(which) - 1)
+        out = np.zeros(len(pixels))
+        np.maximum.at(out, ray, np.linalg.norm(rays[ray], axis=1) * (depths[:, 1] - depths[:, 0]))
+        return out
 
     def _edges(self, silhouettes: list[_Silhouette], which: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array, Array, Array]:
         """Viewing edges: camera (E,), ray (E, 3) with z = 1, normal (E, 3), both in the camera's frame, and depths (E, 2)."""
