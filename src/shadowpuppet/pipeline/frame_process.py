@@ -51,7 +51,7 @@ class Task:
     images: bool = True
     """Whether `FrameSet.images` are wanted."""
     corrected: bool = True
-    """Whether `FrameSet.corrected` are wanted."""
+    """Whether `FrameSet.corrected` are wanted, at half size: every second pixel of every second row."""
     hull: VisualHull | None = None
     """Computes `FrameSet.points`; None: they are not wanted."""
 
@@ -63,8 +63,8 @@ class Task:
                 begin = time.perf_counter()
                 points = None if self.hull is None else self.hull.points(seen.masks)
                 images = seen.images if self.images else (None,) * len(seen.images)
-                yield seen._replace(images=images, corrected=seen.corrected if self.corrected else (), points=points,
-                                    carving=time.perf_counter() - begin)
+                corrected = tuple(None if each is None else each[::2, ::2].copy() for each in seen.corrected) if self.corrected else ()
+                yield seen._replace(images=images, corrected=corrected, points=points, carving=time.perf_counter() - begin)
 
     @property
     def is_long(self) -> bool:

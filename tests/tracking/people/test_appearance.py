@@ -39,13 +39,13 @@ def person(arms: float = 0.25) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def pictures(shirt=SHIRT, trousers=TROUSERS, head=SKIN, gain: float = 1.0, noise: float = 3.0, seed: int = 0) -> list[np.ndarray]:
-    """What each camera sees of somebody upright: bands of colours."""
+    """What each camera sees of an upright person, at half size: bands of colours."""
     rng, found = np.random.default_rng(seed), []
     for camera in CAMERAS:
         rows = camera.project(np.array([[0.0, 0, 0.6], [0, 0, -0.05]]))[:, 1].round().astype(int)
         image = np.zeros((SIZE[1], SIZE[0], 3))
         image[: rows[0]], image[rows[0] : rows[1]], image[rows[1] :] = head, shirt, trousers
-        found.append((image * gain + rng.normal(0, noise, image.shape)).clip(0, 255).astype(np.uint8))
+        found.append((image * gain + rng.normal(0, noise, image.shape)).clip(0, 255).astype(np.uint8)[::2, ::2])
     return found
 
 
@@ -113,7 +113,7 @@ def test_what_was_never_seen_is_not_known():
 def test_an_upright_figure_is_seen_like_a_body():
     figure = colours_of_figure(CAMERAS, np.zeros(2), 1.6, -0.85, FREE, pictures())
     assert not figure[:, 1].any()
-    assert difference(figure, worn(pictures(seed=1))) < 0.6
+    assert difference(figure, worn(pictures(seed=1))) < 0.7
     assert difference(figure, worn(pictures(trousers=(40, 110, 90)))) > 2
 
 

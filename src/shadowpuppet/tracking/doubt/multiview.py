@@ -105,10 +105,10 @@ class MultiviewDoubt:
         """For each of `LIMBS`: the share of it without surface points; the points near it that no part explains, over those that its
         surface should have; and the root mean square distance (m) of the others from its parts. `starts`, `ends`: of the parts' axes
         (S, 3); `points` (P, 3)."""
-        along = ends - starts
-        share = np.einsum("psa,sa->ps", points[:, None] - starts, along) / np.maximum((along**2).sum(1), 1e-9)
-        closest = starts + np.clip(share, 0, 1)[..., None] * along
-        distances = np.linalg.norm(points[:, None] - closest, axis=2) - self._radii
+        along, squared = ends - starts, ((ends - starts) ** 2).sum(1)
+        to, across = points @ along.T - (starts * along).sum(1), (points**2).sum(1)[:, None] - 2 * points @ starts.T + (starts**2).sum(1)
+        share = np.clip(to / np.maximum(squared, 1e-9), 0, 1)
+        distances = np.sqrt(np.maximum(across - share * (2 * to - share * squared), 0)) - self._radii
         part = distances.argmin(1)
         limb, distance = self._limb_of_parts[part], distances[np.arange(len(part)), part]
         expected = np.maximum(self._surface_shares * len(points), 1e-9)

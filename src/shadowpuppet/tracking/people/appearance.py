@@ -53,8 +53,8 @@ def _part(name: str) -> int:
 
 def colours_of_body(cameras: Sequence[Camera], centres: Array, radii: Array, parts: NDArray[np.int64], free: Sequence[Mask | None],
                     images: Sequence[NDArray[np.uint8] | None]) -> Colours:
-    """Colours of a body of spheres, centres (K, 3) and radii (K,), in metres, and their parts (K,), in one frame's images (H, W, 3) or
-    (H, W); `free`: pixels (H / 2, W / 2) that only this body explains. None for a camera without a picture."""
+    """Colours of a body of spheres, centres (K, 3) and radii (K,), in metres, and their parts (K,), in one frame's images (H / 2, W / 2, 3)
+    or (H / 2, W / 2), every second pixel; `free`: pixels (H / 2, W / 2) that only this body explains. None for a camera without one."""
     around = AROUND * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     found = nothing(len(cameras))
     for n, (camera, mask, image) in enumerate(zip(cameras, free, images)):
@@ -101,11 +101,11 @@ def _hidden(camera: Camera, centres: Array, radii: Array, parts: NDArray[np.int6
 
 
 def _add(found: Colours, camera: Camera, points: Array, parts: NDArray[np.int64], free: Mask, image: NDArray[np.uint8]) -> None:
-    """Count the colours of points (P, 3) of parts (P,) in one camera's image; `found`: (parts, 3, `BINS`)."""
-    x, y = np.rint(np.nan_to_num(camera.project(points), nan=-9.0).clip(-9, 1e6)).astype(int).T
+    """Count the colours of points (P, 3) of parts (P,) in one camera's image at half size; `found`: (parts, 3, `BINS`)."""
+    x, y = np.rint(np.nan_to_num(camera.project(points), nan=-9.0).clip(-9, 1e6)).astype(int).T // 2
     inside = (x >= 0) & (y >= 0) & (x < image.shape[1]) & (y < image.shape[0])
     x, y, parts = x[inside], y[inside], parts[inside]
-    seen = free[y // 2, x // 2]
+    seen = free[y, x]
     channels = _channels(image[y[seen], x[seen]])
     at = np.clip((channels - LOWEST) / (HIGHEST - LOWEST), 0, 1) * (BINS - 1)
     low = np.minimum(at.astype(int), BINS - 2)
