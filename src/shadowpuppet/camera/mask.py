@@ -35,3 +35,11 @@ def check_mask(mask: ArrayLike, size: tuple[int, int], what: str = "mask") -> Ma
 def may_be_person(mask: Mask) -> bool:
     """Whether a mask is neither empty nor nearly all of the picture."""
     return bool(0 < np.count_nonzero(mask) < NEARLY_ALL * mask.size)
+
+
+def grown(mask: Mask, by: int) -> Mask:
+    """A mask (H, W) grown by a number of pixels to all sides, corners included; shrunk if it is negative."""
+    import cv2
+
+    square = np.ones((2 * abs(by) + 1,) * 2, np.uint8)
+    return np.asarray((cv2.dilate if by > 0 else cv2.erode)(mask.view(np.uint8), square), np.uint8).view(np.bool_)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.mask import Mask, grown, may_be_person
 
 REACH = 0.07
 """Distance beside the drawn body that clothes, hair and small errors explain, over the square root of the body's area (some 5 cm)."""
@@ -57,10 +57,7 @@ class Unexplained(NamedTuple):
 
 def near(drawn: Mask) -> Mask:
     """Pixels (H, W) of a drawn body (H, W), and beside it."""
-    import cv2
-
-    radius = max(1, round(REACH * np.count_nonzero(drawn) ** 0.5))
-    return np.asarray(cv2.dilate(drawn.view(np.uint8), np.ones((2 * radius + 1,) * 2, np.uint8)), np.uint8).view(np.bool_)
+    return grown(drawn, max(1, round(REACH * np.count_nonzero(drawn) ** 0.5)))
 
 
 def look_beside(last: Unexplained | None, silhouette: Mask, drawn: Mask, looks: int, ignored: Mask | None = None) -> Unexplained:

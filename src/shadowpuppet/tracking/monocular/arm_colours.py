@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.colour_codes import LEVELS, NUMBER, Codes, step_of, thinned
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, grown
 from shadowpuppet.camera.rasterize import Bits, Picture, count, pack, unpack
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.silhouette_cost import Observation, PartObservation
@@ -67,7 +67,7 @@ class ArmColours:
         last = ColourCounts(*np.zeros((3, NUMBER), np.int64)) if counts is None else counts
         hand, forearm, upper, head, rest = (thinned(self._drawn(pose, kind)) for kind in KINDS)
         others, arms = rest | head | upper, hand | forearm | upper
-        shown = (hand & ~others, _grown(forearm, -EDGE) & ~_grown(others, EDGE), _grown(rest, -EDGE) & ~_grown(arms, ABOUT_ARMS) & ~head)
+        shown = (hand & ~others, grown(forearm, -EDGE) & ~grown(others, EDGE), grown(rest, -EDGE) & ~grown(arms, ABOUT_ARMS) & ~head)
         own = thinned(mask)
         return ColourCounts(*(each + np.bincount(codes[pixels & own], minlength=NUMBER) for each, pixels in zip(last, shown)))
 
@@ -81,9 +81,9 @@ class ArmColours:
         if not kinds:
             return None
         step = step_of(self.picture.camera.size)
-        found = _grown(_grown(of_arms[codes] & thinned(mask), -1), 1)  # without single pixels
+        found = grown(grown(of_arms[codes] & thinned(mask), -1), 1)  # without single pixels
         found = found.repeat(step, 0).repeat(step, 1)[: mask.shape[0], : mask.shape[1]] & mask
-        apart = _grown(self._drawn(pose, "head"), ABOUT_HEAD * step) | ~self._before_trunk(found, pose, step)
+        apart = grown(self._drawn(pose, "head"), ABOUT_HEAD * step) | ~self._before_trunk(found, pose, step)
         ignored = ignore | pack(apart) | self.picture.leg_bits(pose)
         return PartObservation(Observation(pack(found) | ignored, ignored), tuple(self._names(kinds)))
 
@@ -95,7 +95,7 @@ class ArmColours:
         number, parts = cv2.connectedComponents(found.view(np.uint8))
         labels = np.asarray(parts, np.intp)
         over = np.bincount(labels[trunk & found], minlength=number) >= OVER_TRUNK * step**2
-        return trunk | _grown(over[labels], ABOUT_FOUND * step)
+        return trunk | grown(over[labels], ABOUT_FOUND * step)
 
     def mismatch(self, seen: PartObservation, pose: Array) -> dict[str, float]:
         """Of each arm in a pose (D,), the pixels of its parts that have other colours, and those of the arms' colours that neither arm
@@ -165,11 +165,3 @@ def _frequencies(numbers: NDArray[np.int64]) -> Array:
         smooth[:-1] += NEIGHBOURS * along[1:]
         found = np.moveaxis(smooth, 0, axis)
     return found.ravel()
-
-
-def _grown(mask: Mask, by: int) -> Mask:
-    """A mask (H, W) grown by a number of pixels to all sides; shrunk if it is negative."""
-    import cv2
-
-    square = np.ones((2 * abs(by) + 1,) * 2, np.uint8)
-    return (cv2.dilate if by > 0 else cv2.erode)(mask.view(np.uint8), square).view(bool)

@@ -10,7 +10,7 @@ import numpy as np
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.mask import Mask, grown, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, make_cloud
@@ -116,16 +116,13 @@ def half_size(mask: Mask | None) -> Mask:
 
 def _without(surface: SurfacePoints, views: BodyInViews, left_out: Sequence[Mask | None]) -> SurfacePoints:
     """The surface points but those on contours of pixels (H, W) that are left out."""
-    import cv2
-
     kept = np.ones(len(surface.points), bool)
     for n, (picture, mask) in enumerate(zip(views.pictures, left_out)):
         own = np.flatnonzero(surface.cameras == n)
         if mask is not None and len(own):
-            wide = np.asarray(cv2.dilate(mask.view(np.uint8), np.ones((3, 3), np.uint8)), np.uint8)
             pixels = np.rint(np.nan_to_num(picture.camera.project(surface.points[own])).clip(-1, 1e6)).astype(int)
             x, y = pixels.clip(0, np.array(mask.shape[::-1]) - 1).T  # points lie on contours, at most a pixel outside
-            kept[own] = wide[y, x] == 0
+            kept[own] = ~grown(mask, 1)[y, x]
     points, normals, weights, cameras = surface
     return surface if kept.all() else SurfacePoints(points[kept], normals[kept], weights[kept], cameras[kept])
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.whole_body import GLOBAL_DOFS
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, grown
 from shadowpuppet.camera.rasterize import count
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
@@ -176,12 +176,9 @@ def _ignored(drawn: Sequence[Mask], others: Sequence[tuple[Sequence[Mask], Seque
 
 def _around(drawn: Mask) -> Mask:
     """Pixels (H, W) about a drawn body in which the person may be in the next frame."""
-    import cv2
-
     if not drawn.any():
         return np.ones_like(drawn)
-    radius = max(2, round(OWN_REACH * np.count_nonzero(drawn) ** 0.5))
-    return np.asarray(cv2.dilate(drawn.view(np.uint8), np.ones((2 * radius + 1,) * 2, np.uint8)), np.uint8).view(np.bool_)
+    return grown(drawn, max(2, round(OWN_REACH * np.count_nonzero(drawn) ** 0.5)))
 
 
 def own_masks(drawn: Drawn, masks: Sequence[Mask | None], ignored: Sequence[Mask | None]) -> list[Mask | None]:
