@@ -87,13 +87,13 @@ def main_part(mask: Labels, sure: NDArray[np.bool_], several: bool = False) -> L
     counts[0] = 0
     large = counts >= MIN_PART_SHARE * counts.max()
     if several:
-        return _parts(parts, large)
-    kept = _parts(parts, np.arange(number) == counts.argmax())
+        return chosen_parts(parts, large)
+    kept = chosen_parts(parts, np.arange(number) == counts.argmax())
     large[counts.argmax()] = False
     if large.any():
         near, touching = cv2.dilate(kept, disc(max(1, round(MAX_PART_GAP * counts.max() ** 0.5)))), np.zeros(number, np.int64)
         part_sizes(parts, near, touching)
-        kept |= _parts(parts, large & (touching > 0))
+        kept |= chosen_parts(parts, large & (touching > 0))
     return kept
 
 
@@ -106,7 +106,7 @@ def _connected(mask: Labels, connectivity: int) -> tuple[int, NDArray[np.int32]]
     return number, np.asarray(parts, np.int32)
 
 
-def _parts(parts: NDArray[np.int32], chosen: NDArray[np.bool_]) -> Labels:
+def chosen_parts(parts: NDArray[np.int32], chosen: NDArray[np.bool_]) -> Labels:
     """1 for pixels of the parts that `chosen` (K,) has, else 0, of parts' numbers (H, W)."""
     from shadowpuppet.silhouette._kernels import some_parts
 
@@ -133,4 +133,4 @@ def fill_small_holes(mask: Labels) -> Labels:
     filled = sizes <= MAX_HOLE_SHARE * np.count_nonzero(mask)
     for border in (parts[0], parts[-1], parts[:, 0], parts[:, -1]):
         filled[border] = False
-    return mask | _parts(parts, filled)
+    return mask | chosen_parts(parts, filled)

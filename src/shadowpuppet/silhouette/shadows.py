@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shadowpuppet.jit import compiled
+from shadowpuppet.silhouette.cleanup import bounding_window, chosen_parts
 
 if TYPE_CHECKING:
     from shadowpuppet.silhouette.background import Floats, Image
@@ -65,19 +66,17 @@ def _with_limbs(label: Labels, either: Labels, planes: Image, mean: Floats, inve
     import cv2
 
     firm = np.asarray(cv2.morphologyEx(either, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), np.uint8)
-    x, y, width, height = cv2.boundingRect(firm)
-    if not width * height:
+    window = bounding_window(firm, 1)
+    if not firm[window].any():
         return label
-    window = slice(y, y + height), slice(x, x + width)
-    number, parts = cv2.connectedComponents(np.ascontiguousarray(firm[window]), connectivity=4)
-    sums = _part_sums(np.asarray(parts), number, label, y, x, planes, mean, inverse_sigma)
+    number, labels = cv2.connectedComponents(np.ascontiguousarray(firm[window]), connectivity=4)
+    parts = np.asarray(labels, np.int32)
+    sums = _part_sums(parts, number, label, window[0].start, window[1].start, planes, mean, inverse_sigma)
     limbs = _limbs(sums, noise) | _thin_limbs(sums) if smeared else _limbs(sums, noise)
     if not limbs.any():
         return label
-    found = np.zeros_like(label)
-    found[window] = limbs[np.asarray(parts, np.intp)]
-    out = label.copy()
-    out |= np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either >> 7)
+    found, out = chosen_parts(parts, limbs), label.copy()
+    out[window] |= np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either[window] >> 7)
     return out
 
 

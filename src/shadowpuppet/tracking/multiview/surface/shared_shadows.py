@@ -15,6 +15,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.silhouette.boundary import disc
+from shadowpuppet.silhouette.cleanup import chosen_parts
 from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 
@@ -92,5 +93,5 @@ def _limbs(pixels: NDArray[np.int64], lengths: Array, shadow: Mask, pitch: int) 
     limb = np.zeros(number, bool)
     limb[parts[y[long], x[long]]] = True
     limb[0] = False
-    out[window] = limb[parts]
+    out[window] = chosen_parts(parts, limb).view(np.bool_)
     return out
