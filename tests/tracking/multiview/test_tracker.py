@@ -198,8 +198,9 @@ def test_each_cycle_has_less_noise_than_the_last():
     assert scales == [(1.0, True), (0.25, False), (0.0625, False)]
 
 
-@pytest.mark.parametrize(("cameras", "particles", "free_space"), [(5, 40, True), (6, 16, False), (7, 16, False)])
-def test_from_six_cameras_on_there_are_fewer_particles_and_no_free_space(cameras, particles, free_space, monkeypatch):
+@pytest.mark.parametrize(("cameras", "particles", "free_space"),
+                         [(3, 40, True), (4, 40, True), (5, 28, True), (6, 16, False), (7, 16, False)])
+def test_more_cameras_need_fewer_particles_and_from_six_on_no_free_space(cameras, particles, free_space, monkeypatch):
     views = (actor.cameras() * 2)[:cameras]
     of = MultiviewTracker(actor.body(), views, MultiviewSettings())
     assert of.number == particles

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -32,11 +33,11 @@ from shadowpuppet.tracking.unexplained import Unexplained, look_beside
 
 MIN_POINTS, MIN_EXTENT = 50, 0.5
 """Smallest number and smallest extent (m) of the surface points of a person."""
-MANY_CAMERAS = 6
-PARTICLES_FEW_CAMERAS, PARTICLES_MANY_CAMERAS = 40, 16
-"""Default particle numbers below and from `MANY_CAMERAS` cameras."""
-FEW_CAMERAS = 4
-"""Number of cameras up to which all poses go through the fine iterations of Gauss-Newton: they leave more of them possible."""
+FEW_CAMERAS, MANY_CAMERAS = 4, 6
+"""Number of cameras up to which all poses go through the fine iterations of Gauss-Newton, as more of them are possible; and from which on
+the surface points are precise enough without free space."""
+PARTICLES = (40, 28, 16)
+"""Default particle numbers with up to `FEW_CAMERAS`, between, and from `MANY_CAMERAS` on."""
 FEWEST_FINALISTS = 8
 """Least number of poses that go through the fine iterations of Gauss-Newton, if there are as many."""
 
@@ -219,7 +220,6 @@ class MultiviewTracker:
     def _gauss_newton(self, observation: MultiviewObservation, last: Array) -> Refine:
         """The default preset's refinement (not in the paper)."""
         s, g = self.settings, self.settings.gauss_newton
-        # the surface from many cameras is precise enough without free space, which costs time
         space = observation.space if g.emptiness and len(self.cameras) < MANY_CAMERAS else None
         coarse = Pass(observation.cloud(g.share), g.coarse, g.coarse_tau, space, g.emptiness)
         fine = Pass(observation.full, g.fine, g.fine_tau, space, g.emptiness)
@@ -251,7 +251,7 @@ class MultiviewTracker:
         """Number of particles, N."""
         if self.settings.method == "image_force":
             return 1
-        return self.settings.particles or (PARTICLES_FEW_CAMERAS if len(self.cameras) < MANY_CAMERAS else PARTICLES_MANY_CAMERAS)
+        return self.settings.particles or PARTICLES[bisect((FEW_CAMERAS + 1, MANY_CAMERAS), len(self.cameras))]
 
     @cached_property
     def views(self) -> BodyInViews:
