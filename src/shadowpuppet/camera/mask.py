@@ -13,6 +13,8 @@ Mask = NDArray[np.bool_]
 """A silhouette, of shape (H, W)."""
 NEARLY_ALL = 0.8
 """Share of the picture above which a silhouette is implausible."""
+Window = tuple[slice, slice]
+"""Rows and columns of a picture."""
 
 
 class Seen(NamedTuple):
@@ -37,9 +39,19 @@ def may_be_person(mask: Mask) -> bool:
     return bool(0 < np.count_nonzero(mask) < NEARLY_ALL * mask.size)
 
 
+def bounding_window(mask: Mask | NDArray[np.uint8], margin: int) -> Window:
+    """Bounding box of the set pixels of a mask (H, W), with a margin (pixels)."""
+    import cv2
+
+    x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
+    return slice(max(y - margin, 0), y + height + margin), slice(max(x - margin, 0), x + width + margin)
+
+
 def grown(mask: Mask, by: int) -> Mask:
     """A mask (H, W) grown by a number of pixels to all sides, corners included; shrunk if it is negative."""
     import cv2
 
-    square = np.ones((2 * abs(by) + 1,) * 2, np.uint8)
-    return np.asarray((cv2.dilate if by > 0 else cv2.erode)(mask.view(np.uint8), square), np.uint8).view(np.bool_)
+    window, square, out = bounding_window(mask, abs(by)), np.ones((2 * abs(by) + 1,) * 2, np.uint8), np.zeros_like(mask)
+    found = (cv2.dilate if by > 0 else cv2.erode)(np.ascontiguousarray(mask[window]).view(np.uint8), square)
+    out[window] = np.asarray(found, np.uint8).view(np.bool_)
+    return out

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, bounding_window
 from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.plain import for_json, plain
@@ -26,7 +26,6 @@ from shadowpuppet.motion.motion import Motion
 from shadowpuppet.pipeline.look import Look, RigLook
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig
-from shadowpuppet.silhouette.cleanup import bounding_window
 from shadowpuppet.tracking.frozen import Interval
 
 Item = TypeVar("Item")

@@ -44,8 +44,8 @@ def classify(planes, within, mean, inverse_sigma, keyed, shadowed, darkest, aske
 
 @compiled(nogil=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
 def contrast(planes, mean, seen, where, out):
-    """Euclidean difference (H, W), grey levels, of `planes` uint8 and `mean` float32 (H, W, 3) in the channels of `seen` (3,), where `where`
-    (H, W) is not 0; 0 elsewhere."""
+    """Euclidean difference (H, W), grey levels, of `planes` uint8 and `mean` float32 (H, W, 3) in the channels of `seen` (3,), in pixels in
+    which `where` (H, W) is not 0; 0 elsewhere."""
     for y in range(planes.shape[0]):
         for x in range(planes.shape[1]):
             if not where[y, x]:

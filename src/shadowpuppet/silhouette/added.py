@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, bounding_window
 from shadowpuppet.silhouette.background import Floats, Image, to_planes
-from shadowpuppet.silhouette.cleanup import bounding_window
 from shadowpuppet.silhouette.recovery.colours import colour_model, log_ratio
 
 STILL_SHARE = 0.85

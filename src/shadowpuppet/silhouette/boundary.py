@@ -9,8 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Window = tuple[slice, slice]
-"""Rows and columns of a picture."""
 Labels = NDArray[np.uint8]
 """Of shape (H, W): 0 background, 1 perhaps a person, 2 surely; in clean-up 0 or 1."""
 Contrast = NDArray[np.float32]

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.mask import Window
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette.background import (
     SMOOTHING,
@@ -25,7 +26,7 @@ from shadowpuppet.silhouette.background import (
     to_brightness,
     to_planes,
 )
-from shadowpuppet.silhouette.boundary import Labels, Window, disc
+from shadowpuppet.silhouette.boundary import Labels, disc
 
 if TYPE_CHECKING:
     from shadowpuppet.silhouette.areas import AreaFilter

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.silhouette.boundary import OUTWARD_REACH, Contrast, EdgeProfile, Labels, Window, at_half_contrast, disc, outline_reach
+from shadowpuppet.camera.mask import Window, bounding_window
+from shadowpuppet.silhouette.boundary import OUTWARD_REACH, Contrast, EdgeProfile, Labels, at_half_contrast, disc, outline_reach
 
 MIN_PART_SHARE = 0.02
 """Least size of another part of the person (a hand), or of another person, over the largest part's: a person five times as far away as two
@@ -113,14 +114,6 @@ def chosen_parts(parts: NDArray[np.int32], chosen: NDArray[np.bool_]) -> Labels:
     out = np.empty(parts.shape, np.uint8)
     some_parts(parts, chosen, out)
     return out
-
-
-def bounding_window(mask: Labels, margin: int) -> Window:
-    """Bounding box of the set pixels, with a margin (pixels)."""
-    import cv2
-
-    x, y, width, height = cv2.boundingRect(mask)
-    return slice(max(y - margin, 0), y + height + margin), slice(max(x - margin, 0), x + width + margin)
 
 
 def fill_small_holes(mask: Labels) -> Labels:

@@ -20,8 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.camera.mask import Mask
-from shadowpuppet.silhouette.cleanup import Window, bounding_window
+from shadowpuppet.camera.mask import Mask, Window, bounding_window
 
 THIN, LONG = 0.06, 0.55
 """Greatest width and least length of a line, over the square root of the person's area (some 0.7 m)."""

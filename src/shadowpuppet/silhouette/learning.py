@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.mask import Window, bounding_window
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.silhouette import background as scene
 from shadowpuppet.silhouette.areas import AreaFilter
@@ -16,7 +17,7 @@ from shadowpuppet.silhouette.background import Background, FilmNoise, Floats, Im
 from shadowpuppet.silhouette.boundary import SHARP_WIDTH, Contrast, EdgeProfile, Labels, outline_width
 from shadowpuppet.silhouette.channels import KeyChoice, choose_key
 from shadowpuppet.silhouette.classifiers import METHODS, AreaColours, ChannelClassifier, EmptyScene, edge_jitter
-from shadowpuppet.silhouette.cleanup import Window, bounding_window, coarse_person
+from shadowpuppet.silhouette.cleanup import coarse_person
 from shadowpuppet.silhouette.correction.detail import lost_detail
 from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.segmenter import Segmenter

@@ -13,9 +13,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.mask import bounding_window
 from shadowpuppet.silhouette.background import Image, smoothed, to_planes
 from shadowpuppet.silhouette.classifiers import ChannelClassifier
-from shadowpuppet.silhouette.cleanup import bounding_window, coarse_person
+from shadowpuppet.silhouette.cleanup import coarse_person
 from shadowpuppet.silhouette.segmenter import Labelled, Segmented, Segmenter
 
 INTERVAL = 0.5

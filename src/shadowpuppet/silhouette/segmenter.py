@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.mask import Window
 from shadowpuppet.silhouette.background import Background, Image, check_alike, check_image, to_planes
 from shadowpuppet.silhouette.boundary import Contrast, EdgeProfile, Labels
 from shadowpuppet.silhouette.classifiers import METHODS, AveragingClassifier, ChannelClassifier, Classifier
-from shadowpuppet.silhouette.cleanup import Cleaned, Window, clean
+from shadowpuppet.silhouette.cleanup import Cleaned, clean
 from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.correction.registration import Gap
 from shadowpuppet.silhouette.settings import SilhouetteSettings
@@ -151,8 +152,8 @@ class Segmenter:
         return AveragingClassifier.of_background(self.background, self.settings.factor)
 
     def contrast(self, image: Image, window: Window, where: Labels) -> Contrast:
-        """Difference to the background (h, w) in the method's channels, grey levels, in a window of rows and columns; 0 where `where` (h, w)
-        is 0."""
+        """Difference to the background (h, w) in the method's channels, grey levels, in a window of rows and columns, of pixels in which
+        `where` (h, w) is not 0; 0 elsewhere."""
         from shadowpuppet.silhouette._kernels import contrast
 
         planes = to_planes(np.ascontiguousarray(image[window]))

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shadowpuppet.camera.mask import bounding_window
 from shadowpuppet.jit import compiled
-from shadowpuppet.silhouette.cleanup import bounding_window, chosen_parts
+from shadowpuppet.silhouette.cleanup import chosen_parts
 
 if TYPE_CHECKING:
     from shadowpuppet.silhouette.background import Floats, Image

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.mask import Window
 from shadowpuppet.silhouette.background import Image
-from shadowpuppet.silhouette.cleanup import Window
 from shadowpuppet.silhouette.correction.detail import LostDetail
 from shadowpuppet.silhouette.correction.light import Light
 from shadowpuppet.silhouette.correction.registration import Gap, Homography, Registration

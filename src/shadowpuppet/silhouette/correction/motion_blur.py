@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.mask import bounding_window
 from shadowpuppet.silhouette.background import Image, smoothed, to_planes
 from shadowpuppet.silhouette.boundary import disc
-from shadowpuppet.silhouette.cleanup import bounding_window
 
 FAST = 4
 """Radius (pixels) of discs that fit into what is covered or uncovered within two frames; outlines of slower limbs are mixed anyway."""
