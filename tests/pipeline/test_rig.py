@@ -197,6 +197,13 @@ def test_how_many_sets_there_are_is_reported_where_films_tell_it(tmp_path):
     assert rig(tmp_path, steady(10), steady(12)).count is None
 
 
+def test_films_that_may_have_lost_frames_are_those_with_fewer_than_another(tmp_path):
+    made = rig(tmp_path, steady(20), steady(19), steady(18), steady(9, 5.0), steady(16, 20.0), suffix=".mp4")
+    assert [footage.count for footage in made.footage] == [20, 19, 18, 9, 16]
+    assert made.short == (False, False, True, False, True)
+    assert rig(tmp_path, steady(20), steady(10)).short == (False, False)  # films that do not state their lengths
+
+
 def test_frames_missing_in_one_film_are_none(tmp_path):
     found = numbers(rig(tmp_path, steady(12), np.delete(steady(12), [4, 5])))
     assert found == [(n, n if n < 4 else None if n < 6 else n - 2) for n in range(12)]

@@ -117,6 +117,13 @@ class Rig:
         counts = [footage.count for footage, rate in zip(self.footage, self.rates) if rate == self.rate]
         return max((count for count in counts if count is not None), default=None)
 
+    @property
+    def short(self) -> tuple[bool, ...]:
+        """Whether each camera's film has at least two frames less than another: it may have lost some."""
+        seconds = [math.nan if footage.count is None else footage.count / rate for footage, rate in zip(self.footage, self.rates)]
+        longest = max((each for each in seconds if math.isfinite(each)), default=0.0)
+        return tuple(longest - each > 1.5 / rate for each, rate in zip(seconds, self.rates))
+
     @cached_property
     def leaders(self) -> tuple[int, ...]:
         """Indices of the cameras, in order of preference for setting the times of the sets; the first that still has frames does. Cameras

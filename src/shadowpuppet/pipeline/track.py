@@ -224,7 +224,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
     (look, _, state, before, left_out), earlier = _resumed(writer, prepared, rng)
     writer.begin()
     write_beside(writer.folder, prepared.look, survey.rig, prepared.check().person)
-    watch, count, checkpoints = RigWatch(len(survey.rig.footage)), len(earlier), Checkpoints()
+    watch, count, checkpoints = RigWatch(len(survey.rig.footage), survey.rig.short), len(earlier), Checkpoints()
     leans, last = array("d"), None
     rate = prepared.look.rate if np.isfinite(prepared.look.rate) else FALLBACK_RATE
     listener.begin("tracking", tracked(prepared.look.frames, options.every))

@@ -26,7 +26,8 @@ from shadowpuppet.pipeline import frame_process, progress
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.people.census import people_in, sampled_sets, take_census
 from shadowpuppet.pipeline.people.group import first_people
-from shadowpuppet.pipeline.people.run import PeopleRun, check_people, matched_truths
+from shadowpuppet.pipeline.people.run import PeopleRun, check_people
+from shadowpuppet.pipeline.people.truths import matched_truths
 from shadowpuppet.pipeline.prepare import MULTIVIEW
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.rig import open_rig

@@ -60,6 +60,18 @@ def test_frames_that_are_lost_one_by_one_make_a_camera_early():
     assert watch.aside.present == {1: "early"}
 
 
+@pytest.mark.parametrize(("short", "out"), [((), set()), ((False, True, False, False), {(1, "early")}), ((False, False, False, True), set())])
+def test_where_the_body_follows_a_camera_that_loses_frames_its_shorter_film_says_which_of_two_it_is(short, out):
+    watch = StepWatch(4, short)
+    for n in range(FRAMES):
+        lost = n // 8
+        watch(n / RATE, [person(walk(at), 1 + 4 * n + c) for c, at in enumerate((n, n + lost, n, n))])
+        between = n + lost // 2  # as the opposite cameras 1 and 3 see it
+        watch.tracked([pack(person(walk(at))[::2, ::2]) for at in (n, between, n, between)])
+    assert {(each.camera, each.why) for each in watch.aside.intervals} == out
+    assert not out or watch.aside.present == {1: "early"}
+
+
 def test_it_does_not_matter_how_far_ahead_frames_are_read():
     expected = film(lambda n: 4)[1]
     assert expected.any()

@@ -19,13 +19,11 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.mask import Seen
 from shadowpuppet.camera.rasterize import Bits
-from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError, warn
-from shadowpuppet.io.motion.motion_files import read_truth
+from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError
 from shadowpuppet.io.people import open_places, person_folder, write_place
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import RunWriter, write_metrics
-from shadowpuppet.motion.motion import JointTable, Motion, MotionFrame
-from shadowpuppet.motion.synchronization import at_common_times
+from shadowpuppet.motion.motion import Motion, MotionFrame
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.look import RigLook, Survey
 from shadowpuppet.pipeline.options import Options
@@ -36,6 +34,7 @@ from shadowpuppet.pipeline.people.group import Group, first_people, seen_in
 from shadowpuppet.pipeline.people.kept import TYPES, KeptGroup, kept, remade, restore
 from shadowpuppet.pipeline.people.member import Look, Member
 from shadowpuppet.pipeline.people.retracing import Packed, Stretch, packed, retraced, stretches, with_final_bodies
+from shadowpuppet.pipeline.people.truths import matched_truths
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.pipeline.progress import (
     FALLBACK_RATE,
@@ -64,8 +63,6 @@ from shadowpuppet.tracking.people.presence import Followed
 from shadowpuppet.tracking.people.tracker import place_of
 from shadowpuppet.video import write_frames
 
-SAME_PERSON = 0.5
-"""Greatest median distance (m) of a tracked person from a truth that is theirs."""
 Smooth = Callable[[RunWriter, Sequence[tuple[int, MultiviewSubject]], Options, Listener, Motion], None]
 """Replaces the motion of a run by a given one, smoothed."""
 
@@ -202,7 +199,7 @@ class PeopleRun:
         look = survey.look
         assert isinstance(look, RigLook)
         rate = look.rate if np.isfinite(look.rate) else FALLBACK_RATE
-        watch, begun = RigWatch(len(self.rig.footage)), carried is not None and carried.begun
+        watch, begun = RigWatch(len(self.rig.footage), self.rig.short), carried is not None and carried.begun
         self.listener.begin("tracking", tracked(look.frames, options.every))
         began = time.perf_counter()
         write_beside(self.folder, look, self.rig)
@@ -326,33 +323,3 @@ def _together(drawn: Sequence[tuple[Bits, ...]]) -> tuple[Bits, ...]:
     """Several bodies in each camera's picture, as bits."""
     shown = [bits for bits in drawn if bits]
     return tuple(np.bitwise_or.reduce(each) for each in zip(*shown)) if shown else ()
-
-
-def matched_truths(motions: Mapping[int, Motion], truths: Sequence[Path]) -> dict[int, Path]:
-    """For each person's motion the truth of a recording that is nearest in the mean, each truth for one person at most."""
-    from scipy.optimize import linear_sum_assignment
-
-    tables = [table for path in truths if (table := _read(path)) is not None]
-    if not tables or not motions:
-        return {}
-    away = np.array([[_apart(motion, table) for _, table in tables] for motion in motions.values()])
-    rows, figures = linear_sum_assignment(np.where(np.isfinite(away), away, 1e6))
-    return {list(motions)[row]: tables[figure][0] for row, figure in zip(rows, figures) if away[row, figure] < SAME_PERSON}
-
-
-def _read(path: Path) -> tuple[Path, JointTable] | None:
-    try:
-        return path, read_truth(path)
-    except ShadowPuppetError as error:
-        warn(f"{path}: no errors are computed: {error}")
-        return None
-
-
-def _apart(motion: Motion, truth: JointTable) -> float:
-    """Median distance (m) of a motion's pelvis from a truth's."""
-    if "pelvis" not in truth.names or not len(motion):
-        return np.inf
-    ours, theirs = at_common_times(motion.table, truth)
-    delta = ours.positions[:, ours.names.index("pelvis")] - theirs.positions[:, theirs.names.index("pelvis")]
-    away = np.linalg.norm(delta, axis=1)
-    return float(np.nanmedian(away)) if np.isfinite(away).any() else np.inf

@@ -23,7 +23,7 @@ OFTEN_LOST, OFTEN_DOUBTFUL = 0.05, {1: 0.6, 2: 0.4}
 WIDE_LIMB = {1: 0.0, 2: 0.065}
 """Expected error (m) of such a limb's joints above which it makes the run doubtful. With several cameras an arm of a clean film may be
 doubtful in two thirds of the frames, as it might be far off, and yet be expected, rightly, to be off by 40 mm in the mean."""
-REMEDIES = {"late": "check its start", "early": "check its start", "frozen": "check its cable", "blind": "look at its film"}
+REMEDIES = {"late": "check its start", "early": "began early, or lost frames?", "frozen": "check its cable", "blind": "look at its film"}
 """What to do about a camera, by why it was set aside."""
 WIDE, FAR = {1: 0.105, 2: 0.05}, {1: 0.12, 2: 0.07}
 """Expected joint errors (m) above which a run is doubtful, and bad; for one camera, and for two or more."""

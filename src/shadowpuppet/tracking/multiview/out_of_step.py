@@ -53,9 +53,10 @@ class StepWatch:
     frame depends on frames `AHEAD` or more before, so that it does not matter how far ahead frames are read.
     """
 
-    def __init__(self, number: int) -> None:
-        """For a number of cameras."""
+    def __init__(self, number: int, short: Sequence[bool] = ()) -> None:
+        """For a number of cameras; `short`: those whose films have fewer frames than others."""
         self.aside = SetAside(number)
+        self._short = tuple(short) or (False,) * number
         self._read = deque[tuple[float, tuple[Bits | None, ...]]]()
         self._seen = deque[Seen]()
         self._verdicts = deque[tuple[str, ...]]([("",) * number] * AHEAD)
@@ -124,14 +125,16 @@ class StepWatch:
         explained = self._misfit <= MISFIT * self._change
         best = np.array([np.nanmax(row) if np.isfinite(row).any() else np.nan for row in share])
         for n, gain in enumerate(best):
-            others = [other for m, other in enumerate(best) if m != n and not self._out[m]]
-            alone = np.isfinite(gain) and all(other < OTHERS * gain for other in others)
             lag = int(np.nan_to_num(share[n], nan=-np.inf).argmax())
+            # a film of fewer frames has lost some: where the body follows it, cameras that are in step look late
+            lossy = self._short[n] and lag >= len(LAGS)
+            others = [other for m, other in enumerate(best) if m != n and not self._out[m] and (self._short[m] or not lossy)]
+            alone = np.isfinite(gain) and all(other < OTHERS * gain for other in others)
             against = share[n, (lag + len(LAGS)) % (2 * len(LAGS))]  # a body that jitters explains neither moment
             clear = bool(gain > LATE and alone and against < IN_STEP and explained[n, lag])
             if not self._out[n]:  # most cameras decide what the time is
                 clear = clear and 2 * sum(map(bool, self._out)) + 2 < len(best)
                 self._out[n] = ("late" if lag < len(LAGS) else "early") if clear else ""
-            elif gain < IN_STEP:
+            elif gain < IN_STEP and not (self._short[n] and self._out[n] == "early"):  # lost frames do not come back
                 self._out[n] = ""
         return tuple(self._out)

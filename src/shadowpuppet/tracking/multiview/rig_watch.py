@@ -14,9 +14,9 @@ class RigWatch:
     """Sets cameras aside that are frozen, blind or out of step, and takes them back: `watch(seconds, masks)` has None in place of their
     masks. `tracked` follows for each frame set, in the same order. Of one camera it notes when it is blind."""
 
-    def __init__(self, number: int) -> None:
-        """For a number of cameras."""
-        self._watch, self._steps = CameraWatch(number), StepWatch(number)
+    def __init__(self, number: int, short: Sequence[bool] = ()) -> None:
+        """For a number of cameras; `short`: those whose films have fewer frames than others."""
+        self._watch, self._steps = CameraWatch(number), StepWatch(number, short)
         self._many = number > 1
 
     def __call__(self, seconds: float, masks: Sequence[Mask | None], own: Sequence[Mask | None] = ()) -> tuple[Mask | None, ...]:
