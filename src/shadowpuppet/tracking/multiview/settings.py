@@ -103,7 +103,7 @@ class MultiviewSettings:
     refinement: Literal["gauss_newton", "forces"] = "gauss_newton"
     """How poses are refined."""
     particles: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
-    """Number of particles, N. Default: 16 with six cameras or more, 28 with five, 40 with fewer, which show less and are faster to draw."""
+    """Number of particles, N. Default: 16 with six cameras or more, 24 with five, 40 with fewer, which show less and are faster to draw."""
     resampling: Literal["stratified", "systematic", "multinomial", "residual"] = "systematic"
     """How particles are selected by their weights."""
     defensive: Share = 0.5

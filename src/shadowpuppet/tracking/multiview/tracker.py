@@ -36,7 +36,7 @@ MIN_POINTS, MIN_EXTENT = 50, 0.5
 FEW_CAMERAS, MANY_CAMERAS = 4, 6
 """Number of cameras up to which all poses go through the fine iterations of Gauss-Newton, as more of them are possible; and from which on
 the surface points are precise enough without free space."""
-PARTICLES = (40, 28, 16)
+PARTICLES = (40, 24, 16)
 """Default particle numbers with up to `FEW_CAMERAS`, between, and from `MANY_CAMERAS` on."""
 FEWEST_FINALISTS = 8
 """Least number of poses that go through the fine iterations of Gauss-Newton, if there are as many."""

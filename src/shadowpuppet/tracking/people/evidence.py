@@ -21,7 +21,8 @@ from shadowpuppet.camera.mask import Mask, grown
 from shadowpuppet.camera.rasterize import count
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
-from shadowpuppet.tracking.multiview.observation import MultiviewObservation, half_size
+from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, half_size
+from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, free_space
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.unexplained import near
@@ -53,6 +54,18 @@ class Drawn(NamedTuple):
 
 class PersonObservation(MultiviewObservation):
     """What a frame shows of one person among others; views that hardly show them do not count in the overlap."""
+
+    def __init__(self, views: BodyInViews, surface: SurfacePoints, masks: Sequence[Mask | None], left_out: Sequence[Mask | None] = (),
+                 drawn: Drawn | None = None) -> None:
+        """As `MultiviewObservation`. `drawn`: the person as expected in this frame; free space is computed near them alone."""
+        super().__init__(views, surface, masks, None, left_out)
+        self.drawn = drawn
+
+    @cached_property
+    def space(self) -> FreeSpace:
+        """Distances to the silhouettes' outlines, for the silhouette constraint."""
+        around = None if self.drawn is None else [self.drawn.masks[n] for n in self.seen]
+        return free_space([(picture.camera, mask) for picture, mask in self.people], around)
 
     def overlap(self, pose: Array) -> float:
         """Intersection over union of a drawn pose (D,) and the silhouettes, mean of the views that show the person apart from others."""

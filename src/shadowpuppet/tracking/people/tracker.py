@@ -91,7 +91,8 @@ def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Ma
     def follow(n: int, evidence: Division) -> tuple[MultiviewState, Drawn]:
         tracker, rng, state = people[n]
         own, ignored = evidence.of(n)
-        state = _judged(tracker.follow(rng, state, PersonObservation(tracker.views, own, masks, None, ignored)))
+        observation = PersonObservation(tracker.views, own, masks, ignored, evidence.drawn[n])
+        state = _judged(tracker.follow(rng, state, observation))
         return state, draw_person(tracker, state.pose)
 
     with ThreadPoolExecutor(max(min(len(people), usable_cores()), 1), "people") as pool:
@@ -120,7 +121,7 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
         return None
     rough = person.search(rng, PersonObservation(person.views, own, [None] * len(masks)))  # the points alone: where the person is
     body = draw_person(person, rough.pose)
-    observation = PersonObservation(person.views, own, masks, None, ignored_pixels(body, list(drawn.values()), masks))
+    observation = PersonObservation(person.views, own, masks, ignored_pixels(body, list(drawn.values()), masks))
     found = person.search(rng, observation)  # beside others front and back hardly differ: both are tried
     other = _facing_the_other_way(person, rng, found, observation)
     best = max(found, other, key=lambda state: np.nan_to_num(state.overlap))
@@ -175,7 +176,7 @@ def keep_front(person: MultiviewTracker, rng: np.random.Generator, before: Multi
 
 def observed(person: MultiviewTracker, share: Share) -> PersonObservation:
     """What a share shows of a person, as it was followed."""
-    return PersonObservation(person.views, share.points, share.masks, None, share.ignored)
+    return PersonObservation(person.views, share.points, share.masks, share.ignored)
 
 
 def _facing_the_other_way(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Limbs
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, Window, bounding_window
 from shadowpuppet.camera.projection import NEAR_PLANE, bend_within, make_lens
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import device, kernel
@@ -29,8 +29,9 @@ OUTVOTING_CAMERAS = 3
 """If a sphere's centre is outside one silhouette only and inside at least this many others, the one is ignored: it may lack a limb."""
 TRUSTED_CAMERAS = 2
 """The same where sizes are solved for: a chair before a limb cuts it off in one silhouette, and the limb must not shrink for it."""
-WINDOW_MARGIN = 24
-"""Margin (pixels) around the person in which distances are computed; farther out they are extrapolated."""
+WINDOW_MARGIN, BODY_MARGIN = 24, 0.5
+"""Margin (pixels) around the silhouettes in which distances are computed, farther out they are extrapolated; and around a body, over the
+square root of its area: some 40 cm."""
 
 
 class Spheres(NamedTuple):
@@ -73,13 +74,15 @@ def spheres_in(limbs: Limbs, lengths: Array | None = None) -> Spheres:
     return Spheres(np.array(joints), np.array(places), np.array(radii), np.array(which))
 
 
-def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
-    """Distances for cameras and their masks (H, W); every mask shows a person."""
+def free_space(views: Sequence[tuple[Camera, Mask]], around: Sequence[Mask] | None = None) -> FreeSpace:
+    """Distances for cameras and their masks (H, W); every mask shows a person. `around`: of each the pixels (H, W) of the body whose limbs
+    are looked at, so that distances are computed near them alone; None: all around the silhouettes."""
     fields, windows, start = [np.zeros(0, np.float32)], [], 0
-    for camera, mask in views:
-        field, left, top = _distances(mask)
+    for (camera, mask), body in zip(views, around or (None,) * len(views), strict=True):
+        rows, columns = _window(mask, body)
+        field = _distances(mask[rows, columns])
         fields.append(field.ravel())
-        windows.append((start, left, top, field.shape[1], field.shape[0], *camera.size))
+        windows.append((start, columns.start, rows.start, field.shape[1], field.shape[0], *camera.size))
         start += field.size
     lenses = [make_lens(camera) for camera, _ in views]
     bends = [[*np.pad(k, (0, 8 - len(k))), fisheye, bent, reach] for _, k, fisheye, bent, reach in lenses]
@@ -92,16 +95,22 @@ def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
     )
 
 
-def _distances(mask: Mask) -> tuple[NDArray[np.float32], int, int]:
-    """Signed distances to the outline, pixels, in a window around the person; the window's first column and row."""
+def _window(mask: Mask, body: Mask | None) -> Window:
+    """Rows and columns around a silhouette (H, W), or around a body (H, W) where silhouette is near it."""
+    if body is not None and (area := np.count_nonzero(body)):
+        window = bounding_window(body, max(WINDOW_MARGIN, round(BODY_MARGIN * area**0.5)))
+        if mask[window].any():
+            return window
+    return bounding_window(mask, WINDOW_MARGIN)
+
+
+def _distances(mask: Mask) -> NDArray[np.float32]:
+    """Signed distances (H, W) to a mask's outline, pixels."""
     import cv2
 
     pixels = np.ascontiguousarray(mask).view(np.uint8)
-    x, y, width, height = cv2.boundingRect(pixels)
-    left, top = max(x - WINDOW_MARGIN, 0), max(y - WINDOW_MARGIN, 0)
-    pixels = pixels[top : y + height + WINDOW_MARGIN, left : x + width + WINDOW_MARGIN]
     outside, inside = (cv2.distanceTransform(part, cv2.DIST_L2, 3) for part in (1 - pixels, pixels))
-    return np.asarray(outside - inside, np.float32), left, top
+    return np.asarray(outside - inside, np.float32)
 
 
 @device
