@@ -60,7 +60,8 @@ def test_frames_that_are_lost_one_by_one_make_a_camera_early():
     assert watch.aside.present == {1: "early"}
 
 
-@pytest.mark.parametrize(("short", "out"), [((), set()), ((False, True, False, False), {(1, "early")}), ((False, False, False, True), set())])
+@pytest.mark.parametrize(("short", "out"),
+                         [((), set()), ((False, True, False, False), {(1, "early")}), ((False, False, False, True), set())])
 def test_where_the_body_follows_a_camera_that_loses_frames_its_shorter_film_says_which_of_two_it_is(short, out):
     watch = StepWatch(4, short)
     for n in range(FRAMES):

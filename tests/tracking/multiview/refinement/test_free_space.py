@@ -10,7 +10,15 @@ from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
-from shadowpuppet.tracking.multiview.refinement.free_space import OUTVOTING_CAMERAS, TAU, Spheres, free_space, push_inside, reach, spheres_in
+from shadowpuppet.tracking.multiview.refinement.free_space import (
+    OUTVOTING_CAMERAS,
+    TAU,
+    Spheres,
+    free_space,
+    push_inside,
+    reach,
+    spheres_in,
+)
 from shadowpuppet.tracking.multiview.refinement.part_sums import SUMS
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refiner
 
