@@ -66,7 +66,7 @@ class FrameSet(NamedTuple):
     own: tuple[Mask | None, ...] = ()
     """Silhouettes (H, W) as each camera's own picture has them; empty where other cameras have added nothing to `masks`."""
     corrected: tuple[Image | None, ...] = ()
-    """Images that fit the masks, in the light of the empty scene (`Segmented.image`), at half size in sets of `frame_process.Task`; empty: not
+    """Images that fit the masks, in the light of the empty scene (`Segmented.image`), at half size in those of `frame_process`; empty: not
     known."""
     shadows: tuple[Mask | None, ...] = ()
     """As in `Seen`."""

@@ -76,7 +76,7 @@ def _with_limbs(label: Labels, either: Labels, planes: Image, mean: Floats, inve
     limbs = _limbs(sums, noise) | _thin_limbs(sums) if smeared else _limbs(sums, noise)
     if not limbs.any():
         return label
-    found, out = chosen_parts(parts, limbs), label.copy()
+    found, out = chosen_parts(parts, limbs > 0), label.copy()
     out[window] |= np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either[window] >> 7)
     return out
 
