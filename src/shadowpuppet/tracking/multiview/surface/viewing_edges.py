@@ -114,7 +114,8 @@ def cut_rays(camera: Indices, rays: Array, relative: Array, lines: Array, spans:
         lines: vertices (2, N) of all polygons.
         spans, circles: runs (C, 2) and their circles (3, C); view j's are those from `bounds[j]` to `bounds[j + 1]`.
         tolerated: number of views that may deny a place, on rays that have no viewing edge of at most `longest` (m) otherwise.
-        witnesses: number of other views, or all if there are fewer, in whose pictures the middle of an edge must lie.
+        witnesses: number of other views, or all if there are fewer, in whose pictures the middle of an edge must lie; if more than one, its
+            first or last quarter will do.
     """
     apart = np.linalg.norm(relative[:, :, :3, 3], axis=2) > MIN_BASELINE  # no view carves its own rays
     most = lines.shape[1] + 2  # each side is crossed at most once
@@ -145,7 +146,11 @@ def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, longest, wi
             while k < n:
                 lo, hi, k = _whole(pieces, at, n, k)
                 found = lo > NEAR_PLANE and hi < FAR and hi - lo > MIN_LENGTH
-                if found and _witnessed(relative, i, apart, u, v, (lo + hi) / 2, lenses, needed):
+                seen = found and _witnessed(relative, i, apart, u, v, (lo + hi) / 2, lenses, needed)
+                if found and not seen and witnesses > 1:
+                    seen = (_witnessed(relative, i, apart, u, v, lo + 0.25 * (hi - lo), lenses, needed)
+                            or _witnessed(relative, i, apart, u, v, lo + 0.75 * (hi - lo), lenses, needed))  # fmt: skip
+                if seen:
                     ray[count], depths[count, 0], depths[count, 1] = r, lo, hi
                     count += 1
                     short |= hi - lo <= most

@@ -120,8 +120,8 @@ class VisualHull:
         return {n: mask for n, mask in given.items() if may_be_person(mask)}
 
     def lengths_inside(self, people: Mapping[int, Mask], camera: NDArray[np.int64], pixels: Array) -> Array:
-        """Lengths (P,), metres, of each viewing ray's longest part that lies inside the silhouettes of all other cameras, its middle in all
-        their pictures; 0 where there is none.
+        """Lengths (P,), metres, of each viewing ray's longest part that lies inside the silhouettes of all other cameras, its middle, first
+        or last quarter in all their pictures; 0 where there is none.
 
         people: masks (H, W) by the camera's index, in order. camera, pixels: the rays, as pixels (P, 2) of cameras (P,), by index.
         """
