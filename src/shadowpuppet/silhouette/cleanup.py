@@ -78,7 +78,7 @@ def main_part(mask: Labels, sure: NDArray[np.bool_], several: bool = False) -> L
 
     from shadowpuppet.silhouette._kernels import part_sizes
 
-    number, parts = _connected(mask, 8)
+    number, parts = connected(mask, 8)
     counts = np.zeros(number, np.int64)
     part_sizes(parts, sure, counts)
     if counts[1:].sum() == 0:
@@ -98,7 +98,7 @@ def main_part(mask: Labels, sure: NDArray[np.bool_], several: bool = False) -> L
     return kept
 
 
-def _connected(mask: Labels, connectivity: int) -> tuple[int, NDArray[np.int32]]:
+def connected(mask: Labels, connectivity: int) -> tuple[int, NDArray[np.int32]]:
     """The number of a mask's connected parts and of the background, and each pixel's part (H, W); 0 is the background."""
     import cv2
 
@@ -120,7 +120,7 @@ def fill_small_holes(mask: Labels) -> Labels:
     """The mask with its small holes filled; background that touches the border is no hole."""
     from shadowpuppet.silhouette._kernels import part_sizes
 
-    number, parts = _connected(1 - mask, 4)
+    number, parts = connected(1 - mask, 4)
     sizes = np.zeros(number, np.int64)
     part_sizes(parts, np.ones_like(mask), sizes)
     filled = sizes <= MAX_HOLE_SHARE * np.count_nonzero(mask)

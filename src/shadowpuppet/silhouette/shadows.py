@@ -10,10 +10,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.camera.mask import bounding_window
 from shadowpuppet.jit import compiled
-from shadowpuppet.silhouette.cleanup import chosen_parts
+from shadowpuppet.silhouette.cleanup import chosen_parts, connected
 
 if TYPE_CHECKING:
     from shadowpuppet.silhouette.background import Floats, Image
@@ -70,19 +71,18 @@ def _with_limbs(label: Labels, either: Labels, planes: Image, mean: Floats, inve
     window = bounding_window(firm, 1)
     if not firm[window].any():
         return label
-    number, labels = cv2.connectedComponents(np.ascontiguousarray(firm[window]), connectivity=4)
-    parts = np.asarray(labels, np.int32)
+    number, parts = connected(np.ascontiguousarray(firm[window]), 4)
     sums = _part_sums(parts, number, label, window[0].start, window[1].start, planes, mean, inverse_sigma)
     limbs = _limbs(sums, noise) | _thin_limbs(sums) if smeared else _limbs(sums, noise)
     if not limbs.any():
         return label
-    found, out = chosen_parts(parts, limbs > 0), label.copy()
+    found, out = chosen_parts(parts, limbs), label.copy()
     out[window] |= np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either[window] >> 7)
     return out
 
 
-def _limbs(sums: np.ndarray, noise: float) -> Labels:
-    """1 for each part that is a limb, else 0, of shape (K,); sums: `_part_sums` (K, 12); noise: see `resolve_shadows`."""
+def _limbs(sums: np.ndarray, noise: float) -> NDArray[np.bool_]:
+    """Whether each part is a limb, of shape (K,); sums: `_part_sums` (K, 12); noise: see `resolve_shadows`."""
     size, inner, light, square, cr, cb, sigma, edge, along, open_edge, across, _ = sums.T
     inner, edge, open_edge = np.maximum(inner, 1), np.maximum(edge, 1), np.maximum(open_edge, 1)
     light, touching = light / inner, along / edge
@@ -93,16 +93,16 @@ def _limbs(sums: np.ndarray, noise: float) -> Labels:
     shaded = (spread >= MAX_EVEN_SPREAD) | (np.hypot(cr, cb) / inner >= MAX_NEUTRAL_HUE)
     joined = (touching >= ENCLOSED_CONTACT) | ((touching >= BROAD_CONTACT) & (sharpness >= SHARP_EDGE))
     alone = (touching >= NECK_CONTACT) & (sharpness >= VERY_SHARP_EDGE) & (spread >= MIN_UNEVEN_SPREAD)
-    return ((size >= MIN_PART_PIXELS) & (light <= MAX_LIMB_LIGHT) & ((shaded & joined) | alone)).astype(np.uint8)
+    return (size >= MIN_PART_PIXELS) & (light <= MAX_LIMB_LIGHT) & ((shaded & joined) | alone)
 
 
-def _thin_limbs(sums: np.ndarray) -> Labels:
-    """1 for each thin part with the edges or the contact of a limb, else 0, of shape (K,); sums: `_part_sums` (K, 12)."""
+def _thin_limbs(sums: np.ndarray) -> NDArray[np.bool_]:
+    """Whether each part is thin, with the edges or the contact of a limb, of shape (K,); sums: `_part_sums` (K, 12)."""
     size, inner, *_, edge, along, open_edge, across, light = sums.T
     light, touching = light / np.maximum(size, 1), along / np.maximum(edge, 1)
     sharpness = across / np.maximum(open_edge, 1) / np.maximum(1 - light, 1e-3)
     joined = (touching >= BROAD_CONTACT) | ((touching >= NECK_CONTACT) & (sharpness >= VERY_SHARP_EDGE))
-    return ((size >= MIN_PART_PIXELS) & (inner <= THIN) & (light <= MAX_LIMB_LIGHT) & joined).astype(np.uint8)
+    return (size >= MIN_PART_PIXELS) & (inner <= THIN) & (light <= MAX_LIMB_LIGHT) & joined
 
 
 @compiled(nogil=True)

@@ -15,7 +15,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.silhouette.boundary import disc
-from shadowpuppet.silhouette.cleanup import chosen_parts
+from shadowpuppet.silhouette.cleanup import chosen_parts, connected
 from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 
@@ -88,8 +88,7 @@ def _limbs(pixels: NDArray[np.int64], lengths: Array, shadow: Mask, pitch: int) 
     found[y, x] = 1
     around = np.asarray(cv2.dilate(found, np.ones((pitch + 1, pitch + 1), np.uint8)), np.uint8) & near
     firm = cv2.morphologyEx(around, cv2.MORPH_OPEN, disc(round(THINNEST / PITCH * pitch)))
-    number, labels = cv2.connectedComponents(firm, connectivity=4)
-    parts, long = np.asarray(labels, np.int32), lengths >= LIMB_LENGTH
+    (number, parts), long = connected(np.asarray(firm, np.uint8), 4), lengths >= LIMB_LENGTH
     limb = np.zeros(number, bool)
     limb[parts[y[long], x[long]]] = True
     limb[0] = False
