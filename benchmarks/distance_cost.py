@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from shadowpuppet.camera.rasterize import unpack
+from shadowpuppet.camera.bits import unpack
 from shadowpuppet.geometry import Array
 from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.tracking.monocular import stages

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import smallest
 
-from shadowpuppet.camera.rasterize import pack
+from shadowpuppet.camera.bits import pack
 from shadowpuppet.evaluation.bench.mono_cases import MonoCase
 from shadowpuppet.evaluation.bench.multi_cases import MultiCase
 from shadowpuppet.evaluation.bench.timing import Contender, in_turns

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from people import shapes_of
 
-from shadowpuppet.camera.rasterize import count
+from shadowpuppet.camera.bits import count
 from shadowpuppet.synthetic import Gesture, Ring, Scene, Spec, Viewpoint, synthesize
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -16,8 +16,9 @@ from shadowpuppet.body.shapes import Body, Hulls, Quads  # fmt: skip
 from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
 from shadowpuppet.body.skeleton import SIDES  # fmt: skip
 from shadowpuppet.body.upper_body import FOREARM, HALF_BREADTH, HAND_POINT, TO_TIP, boxes, cardbox, cardbox_bends, rounded  # fmt: skip
+from shadowpuppet.camera.bits import count
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.rasterize import Picture, count, place
+from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 

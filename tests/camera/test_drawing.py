@@ -13,9 +13,10 @@ from people import BODIES, shapes_of
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.upper_body import CardboxSizes
 from shadowpuppet.camera import drawing
+from shadowpuppet.camera.bits import unpack
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import PALE, SIDE_COLOURS, draw_model, draw_skeleton, matching, overlay_frame
-from shadowpuppet.camera.rasterize import Picture, unpack
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, rigid
 from shadowpuppet.video import open_frames, write_frames

@@ -12,9 +12,10 @@ from people import BODIES, LENSES, camera, picture, random_poses
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.body.skeleton import Joint, Skeleton
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.projection import DIRECTIONS, NEAR_PLANE, make_lens
+from shadowpuppet.camera.projection import DIRECTIONS, FARTHEST, NEAR_PLANE, make_lens, pixel_nearest
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import rigid, rotation_from_vector
+from shadowpuppet.jit import kernel
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -32,6 +33,26 @@ def quad_at(rng: np.random.Generator, depth: tuple[float, float] = (-0.3, 1.5)) 
     flat = np.array([[-w, -h, 0], [w, -h, 0], [x * w, h, 0], [-x * w, h, 0]])
     T = rigid(rotation_from_vector(rng.standard_normal(3) * 1.5), [*rng.uniform(-0.4, 0.4, 2), rng.uniform(*depth)])
     return flat @ T[:3, :3].T + T[:3, 3]
+
+
+@kernel
+def all_nearest(points, T, lens, out):
+    for p in range(points.shape[0]):
+        out[p] = pixel_nearest(T, lens, points[p, 0], points[p, 1], points[p, 2])
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("lens", LENSES)
+@given(seeds)
+@settings(max_examples=30, deadline=None)
+def test_the_nearest_pixel_is_that_of_the_camera(lens, seed):
+    rng = np.random.default_rng(seed)
+    cam, points = camera((70, 50), lens), rng.normal(scale=2, size=(50, 3))
+    found, pixels = np.zeros((50, 2), np.int64), cam.project(points)
+    all_nearest(points, cam.T_camera_world, make_lens(cam), found)
+    ahead = np.isfinite(pixels[:, 0])
+    assert (found[~ahead] == -1).all()
+    assert (np.abs(found[ahead] - np.clip(pixels[ahead], -FARTHEST, FARTHEST)) < 0.5 + 1e-6).all()
 
 
 def projected(view: Picture, poses=None) -> tuple[np.ndarray, np.ndarray]:

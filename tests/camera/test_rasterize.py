@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import array_shapes, arrays
 from mirror import mirrored
 from people import BODIES, SIZES, camera, draw_polygon, picture, random_poses, shapes_of
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.upper_body import upper_body_skeleton
+from shadowpuppet.camera.bits import pack, unpack
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.rasterize import Picture, count, pack, place, unpack
+from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rigid, rotation_from_vector
 from shadowpuppet.jit import BLOCK
@@ -38,26 +38,6 @@ def polygons(draw, whole: bool = False) -> tuple[np.ndarray, tuple[int, int]]:
     if draw(st.booleans()):
         corners = corners[::-1]
     return np.roll(corners, draw(st.integers(0, len(corners))), 0), size
-
-
-# Bits -----------------------------------------------------------------------------------------------------------------
-
-
-@given(arrays(bool, array_shapes(min_dims=2, max_dims=2, max_side=140)))
-def test_bits_hold_a_mask_and_nothing_else(mask):
-    bits = pack(mask)
-    assert bits.shape == (-(-mask.shape[1] // 64), mask.shape[0])
-    assert bits.flags.c_contiguous
-    np.testing.assert_array_equal(unpack(bits, mask.shape[1]), mask)
-    assert count(bits) == mask.sum()  # what pads the last word is empty
-
-
-def test_a_pixel_is_a_bit_of_its_word_column():
-    mask = np.zeros((3, 130), bool)
-    mask[1, 65] = True
-    bits = pack(mask)
-    assert bits[1, 1] == 2
-    assert count(bits) == 1
 
 
 # Polygons -------------------------------------------------------------------------------------------------------------

@@ -9,8 +9,9 @@ from shadowpuppet.body.models import MODELS
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.body.skeleton import Skeleton
+from shadowpuppet.camera.bits import unpack
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.rasterize import Picture, place, polygon_bits, unpack
+from shadowpuppet.camera.rasterize import Picture, place, polygon_bits
 from shadowpuppet.geometry import Array
 
 BODIES = {name: model.make for name, model in MODELS.items() if model.sizes is CardboxSizes}

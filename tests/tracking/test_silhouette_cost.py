@@ -14,7 +14,8 @@ from shadowpuppet.body.segments import parts_of
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.body.skeleton import Coupling, Dof, Joint, Skeleton
 from shadowpuppet.camera import projection, rasterize, scanline
-from shadowpuppet.camera.rasterize import Picture, pack, unpack
+from shadowpuppet.camera.bits import pack, unpack
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.jit import BLOCK
 from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost, silhouette_costs
 

@@ -1,4 +1,4 @@
-"""Projection of quads and hulls of ellipsoids to convex polygons, for blocks of poses: kernels."""
+"""Projection of points, and of quads and hulls of ellipsoids to convex polygons, for blocks of poses: kernels."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ DIRECTIONS = np.stack([np.cos(np.arange(10) * np.pi / 5), np.sin(np.arange(10) *
 """Directions in which a hull's outline is sampled: one corner of its polygon each."""
 NEAR_PLANE = 0.05
 """Depth (m) at which shapes are clipped, so that nothing behind the camera is drawn."""
+FARTHEST = 1e6
+"""Pixels to which points far outside a picture are moved."""
 Lens = tuple[Array, Array, bool, bool, float]
 """Matrix (3, 3); distortion (8,) or (4,); whether fisheye; whether there is any distortion; the radius on the plane z = 1 up to which it
 is valid."""
@@ -22,6 +24,22 @@ def make_lens(camera: Camera) -> Lens:
     mirror, and would map points far outside into the picture. There points are extrapolated in proportion."""
     bends = bool(camera.fisheye or camera.distortion.any())
     return camera.matrix, camera.distortion, camera.fisheye, bends, camera.reach
+
+
+@device
+def pixel_nearest(T, lens, x, y, z):  # pragma: no cover
+    """Column and row of the pixel nearest to a world point, also outside the picture; `T`: world to camera (3, 4). Of a point at or behind
+    the camera both are -1."""
+    K, k, fisheye, bends, reach = lens
+    ahead = T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3]
+    if ahead <= 1e-9:
+        return -1, -1
+    u = (T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3]) / ahead
+    v = (T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3]) / ahead
+    if bends:
+        u, v = bend_within(u, v, k, fisheye, reach)
+    u, v = min(max(K[0, 0] * u + K[0, 2], -FARTHEST), FARTHEST), min(max(K[1, 1] * v + K[1, 2], -FARTHEST), FARTHEST)
+    return int(np.rint(u)), int(np.rint(v))
 
 
 @kernel

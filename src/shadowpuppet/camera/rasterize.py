@@ -1,7 +1,6 @@
 """Silhouettes of a body as a camera sees it, and their difference from a mask (eq. 2), for many poses at once.
 
-Masks are packed as bits `[word_column][row]`, 64 pixels of a row in a 64-bit word, so that inner loops run over rows and vectorise. A
-pixel belongs to a polygon if its centre, at integer coordinates, does (half open: left and top edges count).
+Masks are packed as bits. A pixel belongs to a polygon if its centre, at integer coordinates, does (half open: left and top edges count).
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.body.forward_kinematics import load_joints, place_joints
 from shadowpuppet.body.shapes import Body, Quads
+from shadowpuppet.camera.bits import Bits, unpack
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.projection import DIRECTIONS, NEAR_PLANE, Lens, make_lens, project_hulls, project_quads
 from shadowpuppet.camera.scanline import count_and_clear, draw_outline, find_edges, make_page
@@ -23,30 +23,8 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, rigid, transform
 from shadowpuppet.jit import BLOCK, device, kernel
 
-Bits = NDArray[np.uint64]
 Shapes = tuple[Array, Array, Array, NDArray[np.int64], NDArray[np.int64]]
 """Quads (1 or N, S, 4, 3); ellipsoids' centres and radii (1 or N, S, E, 3) and numbers (S,); joints (S, E)."""
-
-
-def pack(mask: ArrayLike) -> Bits:
-    """Bits (ceil(W / 64), H) of a mask (H, W)."""
-    mask = np.asarray(mask, bool)
-    height, width = mask.shape
-    padded = np.zeros((height, -(-width // 64) * 64), bool)
-    padded[:, :width] = mask
-    words = np.packbits(padded, axis=1, bitorder="little").view("<u8")
-    return np.ascontiguousarray(words.T, np.uint64)
-
-
-def unpack(bits: Bits, width: int) -> NDArray[np.bool_]:
-    """The mask (H, W) of bits (C, H)."""
-    rows = np.ascontiguousarray(bits.T).astype("<u8").view(np.uint8)
-    return np.unpackbits(rows, axis=1, bitorder="little")[:, :width].astype(bool)
-
-
-def count(bits: Bits) -> int:
-    """Number of set pixels."""
-    return int(np.bitwise_count(bits).sum())
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,10 +14,11 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.body.sizes import BoneSizes
+from shadowpuppet.camera.bits import Bits
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import Codes
 from shadowpuppet.camera.mask import Mask, may_be_person
-from shadowpuppet.camera.rasterize import Bits, Picture
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import NOTED, Caution, SettingsError, choices
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.person import Person, read_person

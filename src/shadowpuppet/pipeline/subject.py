@@ -15,10 +15,10 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import CardboxSizes
+from shadowpuppet.camera.bits import Bits
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import Codes
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.camera.rasterize import Bits
 from shadowpuppet.errors import Caution
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person

@@ -22,7 +22,10 @@ LEAST = 2
 
 def same_silhouette(one: Mask, other: Mask, share: float = SAME) -> bool:
     """Whether two masks (H, W) are of the same picture, up to a `share` of the silhouette: what a codec changes."""
-    return one.shape == other.shape and bool(np.count_nonzero(one ^ other) <= share * np.count_nonzero(other))
+    if one.shape != other.shape:
+        return False
+    area = np.count_nonzero(other)
+    return bool(abs(np.count_nonzero(one) - area) <= share * area and np.count_nonzero(one ^ other) <= share * area)  # most differ in area
 
 
 def is_frozen(frames: int, seconds: float) -> bool:

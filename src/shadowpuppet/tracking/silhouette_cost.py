@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.camera.rasterize import Bits, Picture, count, pack
+from shadowpuppet.camera.bits import Bits, count, pack
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 
 Cost = Callable[[Array], Array]
@@ -31,8 +32,12 @@ class Observation:
     @classmethod
     def of(cls, mask: ArrayLike, ignore: ArrayLike | None = None, also: Cost | None = None) -> Observation:
         """The observation of a mask (H, W), with a mask (H, W) of the ignored pixels."""
-        silhouette = pack(mask)
-        skipped = np.zeros_like(silhouette) if ignore is None else pack(ignore)
+        return cls.of_bits(pack(mask), None if ignore is None else pack(ignore), also)
+
+    @classmethod
+    def of_bits(cls, silhouette: Bits, ignore: Bits | None = None, also: Cost | None = None) -> Observation:
+        """The same of bits (C, H)."""
+        skipped = np.zeros_like(silhouette) if ignore is None else ignore
         return cls(silhouette | skipped, skipped, also)
 
     @classmethod

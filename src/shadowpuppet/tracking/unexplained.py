@@ -55,9 +55,14 @@ class Unexplained(NamedTuple):
         return out if out.any() else None
 
 
+def margin_of(area: int) -> int:
+    """Width (pixels) of what counts as near a drawn body of an area (pixels)."""
+    return max(1, round(REACH * area**0.5))
+
+
 def near(drawn: Mask) -> Mask:
     """Pixels (H, W) of a drawn body (H, W), and beside it."""
-    return grown(drawn, max(1, round(REACH * np.count_nonzero(drawn) ** 0.5)))
+    return grown(drawn, margin_of(int(np.count_nonzero(drawn))))
 
 
 def look_beside(last: Unexplained | None, silhouette: Mask, drawn: Mask, looks: int, ignored: Mask | None = None) -> Unexplained:

@@ -66,7 +66,7 @@ def scene(monkeypatch):
     monkeypatch.setattr(fronts, "shows_side", lambda tracker, share: now.side)
     monkeypatch.setattr(later_sizes, "shows", lambda share: False)
     monkeypatch.setattr(module, "find_people", lambda floor, seen, explained=(): list(now.figures))
-    monkeypatch.setattr(module, "explained", lambda drawn, number: [])
+    monkeypatch.setattr(module, "explained", lambda drawn: [])
     monkeypatch.setattr(module, "place_of", lambda body, state: state.place)
     monkeypatch.setattr(module, "step", step)
     monkeypatch.setattr(module, "start", start)

@@ -29,7 +29,7 @@ def member(measured: bool = False) -> Member:
     subject = MultiviewSubject(body=tracker.body, person=Person(actor.sizes(), 1.75, "the height alone"), summary={}, hull=actor.hull(),
                                tracker=tracker, is_measured=measured)
     state = at_pose(tracker, MultiviewState(POSE, 0 * POSE, None, 0.0, 0.8, "tracked"), POSE)
-    share = Share(state, None, [None], Drawn((), np.zeros((0, 3)), np.zeros(0)), [None])
+    share = Share(state, None, [None], Drawn((), (), np.zeros((0, 3)), np.zeros(0)), [None])
     return Member(1, subject, np.random.default_rng(0), state, 1.75, np.zeros(2), share=share)
 
 

@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from people import camera, picture, shapes_of
 
+from shadowpuppet.camera.bits import unpack
 from shadowpuppet.camera.colour_codes import NUMBER, Codes, colour_codes, step_of, thinned
-from shadowpuppet.camera.rasterize import Picture, unpack
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
 from shadowpuppet.tracking.monocular.arm_colours import ENOUGH, ENOUGH_REST, ArmColours, ColourCounts, distinct, kind_of
 from shadowpuppet.tracking.monocular.settings import make_settings

@@ -10,7 +10,8 @@ from people import BODIES, camera, random_poses
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT, PROPORTIONS, SOLE, SizePrior, sizes_from_height
 from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
-from shadowpuppet.camera.rasterize import Picture, place, unpack
+from shadowpuppet.camera.bits import unpack
+from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.pipeline.person import wrong_posture
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, find_person, fit_references, refine

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from solids import looking
 
+from shadowpuppet.camera.bits import pack
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, _half_size
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
@@ -112,3 +113,15 @@ def test_limbs_are_outside_that_two_silhouettes_lack(stage):
     assert none <= one < 0.04  # of errors of pixels
     assert one + 0.02 < two < 0.3
     assert MultiviewObservation(stage, surface, [cut[0], *(None,) * (len(masks) - 1)]).outside(pose) == 0
+
+
+def test_surface_points_of_pixels_that_say_nothing_are_left_out(stage, rng):
+    surface, masks = actor.filmed()[1][0]
+    out = [rng.random(half.shape) < 0.02 if n else None for n, half in enumerate(mask[::2, ::2] for mask in masks)]
+    found = MultiviewObservation(stage, surface, masks, left_out=[None if pixels is None else pack(pixels) for pixels in out]).surface
+    kept = []
+    for point, n in zip(surface.points, surface.cameras):
+        x, y = np.rint(stage.pictures[n].camera.project(point)).astype(int)
+        kept.append(n == 0 or not out[n][max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].any())
+    assert 0.1 < np.mean(kept) < 0.95
+    np.testing.assert_array_equal(found.points, surface.points[kept])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shadowpuppet.camera.rasterize import pack
+from shadowpuppet.camera.bits import pack
 from shadowpuppet.tracking.frozen import LEAST
 from shadowpuppet.tracking.multiview.out_of_step import AHEAD, ENOUGH, LAGS, LATE, MEMORY, MISFIT, MOST, OTHERS, PACE, StepWatch
 

@@ -13,11 +13,12 @@ from shadowpuppet.body.models import make_body
 from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.tracking.people.evidence import Drawn, draw_person
+from shadowpuppet.tracking.people.evidence import draw_person
 from shadowpuppet.tracking.people.shared_sizes import measure, shows
 from shadowpuppet.tracking.people.tracker import Share, at_pose, shows_side
 
 GIRTHS = {"thigh_width": 1.25, "waist_width": 1.25, "pelvis_width": 1.25, "chest_width": 1.15}
+ALL = ~np.uint64(0)
 SETTINGS = MultiviewSettings(particles=6)
 
 
@@ -32,8 +33,8 @@ def stout():
     for pose in poses:
         masks = actor.masks(body, pose)
         state = at_pose(tracker, MultiviewState(pose, 0 * pose, None, 0.0, 0.9, "tracked"), pose)
-        nothing = [np.zeros_like(mask[::2, ::2]) for mask in masks]
-        shares.append(Share(state, actor.hull().points(masks), masks, draw_person(tracker, pose), nothing))
+        drawn = draw_person(tracker, pose)
+        shares.append(Share(state, actor.hull().points(masks), masks, drawn, tuple(map(np.zeros_like, drawn.bits))))
     return true, poses, shares, tracker
 
 
@@ -51,13 +52,13 @@ def test_sizes_come_nearer_to_the_person(rng):
     (0, "tracked", True), (2, "tracked", True), (3, "tracked", False), (0, "lost", False)])
 def test_who_is_hidden_in_most_views_is_not_measured(hidden, status, shown):
     share = stout()[2][0]
-    ignored = [np.full_like(mask, n < hidden) for n, mask in enumerate(share.ignored)]
+    ignored = [np.full_like(bits, ALL if n < hidden else 0) for n, bits in enumerate(share.ignored)]
     assert shows(share._replace(ignored=ignored, state=share.state._replace(status=status))) == shown
 
 
 def test_a_body_outside_of_the_pictures_does_not_show():
     share = stout()[2][0]
-    away = Drawn(tuple(np.zeros_like(mask) for mask in share.drawn.masks), share.drawn.centres, share.drawn.radii)
+    away = share.drawn._replace(bits=tuple(map(np.zeros_like, share.drawn.bits)))
     assert not shows(share._replace(drawn=away))
 
 
@@ -66,7 +67,7 @@ def test_a_side_is_seen_from_a_quarter_about_it():
     share, skeleton = shares[0], tracker.body.skeleton
     seen = []
     for n, camera in enumerate(tracker.cameras):
-        ignored = [np.full_like(mask, m != n) for m, mask in enumerate(share.ignored)]
+        ignored = [np.full_like(bits, ALL if m != n else 0) for m, bits in enumerate(share.ignored)]
         way = camera.centre[:2] - poses[0][skeleton.dof_indices(["root_x", "root_y"])]
         for turn in (0.0, 40.0, 50.0, 90.0, 140.0, 180.0):
             pose = poses[0].copy()

@@ -8,6 +8,7 @@ import actor
 import numpy as np
 import pytest
 
+from shadowpuppet.camera.bits import count, pack
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.people import tracker as module
@@ -37,7 +38,7 @@ def test_a_body_beside_takes_its_points(rng):
     tracker, masks = person(), actor.masks(actor.body(), POSE)
     points = actor.hull().points(masks)
     body = draw_person(tracker, POSE)
-    away = Drawn(tuple(np.zeros_like(mask) for mask in body.masks), body.centres + np.array([5.0, 0, 0]), body.radii)
+    away = body._replace(bits=tuple(map(np.zeros_like, body.bits)), centres=body.centres + np.array([5.0, 0, 0]))
     alone, beside = (step({1: Person(tracker, np.random.default_rng(0), at(tracker, POSE))}, points, masks, others)[1]
                      for others in ({}, {2: away}))  # fmt: skip
     assert len(beside.points.points) == len(alone.points.points) > 0.9 * len(points.points)
@@ -45,7 +46,7 @@ def test_a_body_beside_takes_its_points(rng):
     wider = body._replace(radii=body.radii + 0.05)
     share = step({1: Person(tracker, rng, at(tracker, POSE))}, points, masks, {2: wider})[1]
     assert len(share.points.points) < 0.1 * len(alone.points.points)
-    assert all(ignored[mask[::2, ::2]].mean() > 0.9 for ignored, mask in zip(share.ignored, masks))
+    assert all(count(ignored & pack(mask[::2, ::2])) > 0.9 * mask[::2, ::2].sum() for ignored, mask in zip(share.ignored, masks))
 
 
 def test_the_other_way_is_searched_for(rng):
@@ -67,7 +68,7 @@ def test_the_front_is_kept_unless_the_other_fits_clearly_better(monkeypatch, tur
     now[HEADING] += turn
     other = at(tracker, POSE, turned)._replace(status="lost" if np.isnan(turned) else "tracked")
     monkeypatch.setattr(module, "turn_round", lambda *given: other)
-    share = Share(at(tracker, now, overlap), SimpleNamespace(), [], Drawn((), np.zeros((0, 3)), np.zeros(0)))
+    share = Share(at(tracker, now, overlap), SimpleNamespace(), [], Drawn((), (), np.zeros((0, 3)), np.zeros(0)))
     found = keep_front(tracker, np.random.default_rng(0), at(tracker, POSE), share)
     assert (found.state is other) == kept
     assert (found is share) != kept

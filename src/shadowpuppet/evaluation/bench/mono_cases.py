@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.anthropometry import sizes_from_height
 from shadowpuppet.body.models import make_body
+from shadowpuppet.camera.bits import unpack
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.rasterize import Picture, place, unpack
+from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular.settings import make_settings
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker

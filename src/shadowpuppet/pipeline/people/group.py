@@ -25,7 +25,6 @@ from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.identity import CLEAR, DIFFERENT, Exchange, Identity
 from shadowpuppet.tracking.people.presence import Followed, follow
 from shadowpuppet.tracking.people.tracker import Person, explained, follow_turned, place_of, start, step
-from shadowpuppet.tracking.unexplained import near
 
 LOOK_SECONDS = 0.2
 """Seconds from one look for people to the next."""
@@ -116,7 +115,7 @@ class Group:
         """See who is who, and find new, returning and lost people among the figures that no tracked body explains."""
         drawn = {member.number: member.share.drawn for member in self.present if member.share is not None and member.lost_since is None}
         masks = seen.masks
-        figures = find_people(self.floor, seen, explained(drawn, len(masks)))
+        figures = find_people(self.floor, seen, explained(drawn))
         places = [place_of(member.subject.body, member.state) for member in self.present
                   if member.state is not None and member.lost_since is None]  # fmt: skip
         free = [figure for figure in figures if all(np.linalg.norm(place - figure.place) > SAME_PLACE for place in places)]
@@ -139,7 +138,7 @@ class Group:
                 images: Images) -> list[Colours | None]:
         """See how people are dressed where only they are seen; returns the same of the free figures."""
         cameras = self.floor.cameras
-        beside = {number: [near(mask) for mask in body.masks] for number, body in bodies.items()}
+        beside = {number: body.masks_near() for number, body in bodies.items()}
         figures = [drawn(self.floor, figure) for figure in free]
         for number, body in bodies.items():
             member = self.members[number - 1]

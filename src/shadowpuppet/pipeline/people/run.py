@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes
+from shadowpuppet.camera.bits import Bits
 from shadowpuppet.camera.mask import Seen
-from shadowpuppet.camera.rasterize import Bits
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError
 from shadowpuppet.io.people import open_places, person_folder, write_place
 from shadowpuppet.io.run import read_run

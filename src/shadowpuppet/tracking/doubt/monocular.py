@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.body.upper_body import BOW
+from shadowpuppet.camera.bits import unpack
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.camera.rasterize import unpack
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, joints_of_limbs, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt

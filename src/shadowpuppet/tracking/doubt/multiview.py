@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from shadowpuppet.body.shapes import Limbs
 from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.projection import make_lens, pixel_nearest
 from shadowpuppet.geometry import Array
+from shadowpuppet.jit import kernel
 from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import levers_of, limb_of_part
@@ -120,18 +122,13 @@ class MultiviewDoubt:
     def _looked_up(self, starts: Array, ends: Array, masks: Sequence[Mask | None]) -> tuple[Array, Array]:
         """For each of `LIMBS`: the share of its axis outside a silhouette, and the root of the inverse number of cameras that see it."""
         share = np.linspace(0.05, 0.95, AXIS_POINTS)[:, None, None]
-        axis = (starts + share * (ends - starts)).reshape(-1, 3)
+        axis = np.ascontiguousarray((starts + share * (ends - starts)).reshape(-1, 3))
         limb = np.tile(self._limb_of_parts, AXIS_POINTS)
         seen, out = np.zeros(len(LIMBS)), np.zeros(len(LIMBS))
         for camera, mask in zip(self.tracker.cameras, masks):
             if mask is None or not may_be_person(mask):
                 continue
-            pixels = camera.project(axis)
-            columns, rows = np.rint(np.where(np.isfinite(pixels), pixels, -1)).astype(int).T
-            inside = (columns >= 0) & (rows >= 0) & (columns < mask.shape[1]) & (rows < mask.shape[0])
-            missed = ~mask[rows[inside], columns[inside]]
-            seen += np.bincount(limb[inside], minlength=len(LIMBS))
-            out += np.bincount(limb[inside], missed, minlength=len(LIMBS))
+            _look_up(axis, limb, camera.T_camera_world, make_lens(camera), mask, seen, out)
         number = np.maximum(seen / np.maximum(np.bincount(limb, minlength=len(LIMBS)), 1), 0.25)
         return out / np.maximum(seen, 1), 1 / np.sqrt(number)
 
@@ -177,9 +174,19 @@ class MultiviewDoubt:
         return areas / areas.sum()
 
 
+@kernel
+def _look_up(points, limbs, T, lens, mask, seen, out):  # pragma: no cover
+    """Count the points (P, 3) of each limb that are in the picture into `seen` (5,), and those outside the mask (H, W) into `out` (5,)."""
+    for p in range(limbs.size):
+        x, y = pixel_nearest(T, lens, points[p, 0], points[p, 1], points[p, 2])
+        if 0 <= x < mask.shape[1] and 0 <= y < mask.shape[0]:
+            seen[limbs[p]] += 1
+            out[limbs[p]] += not mask[y, x]
+
+
 def count_still(before: Before | None, masks: Sequence[Mask | None]) -> int:
     """Number of frames for which the silhouette of some camera with a person has not changed."""
     if before is None:
         return 0
-    same = [now is not None and last is not None and now.any() and same_silhouette(now, last) for now, last in zip(masks, before.masks)]
+    same = (now is not None and last is not None and now.any() and same_silhouette(now, last) for now, last in zip(masks, before.masks))
     return before.still + 1 if any(same) else 0

@@ -20,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.camera.bits import Bits, count, pack, unpack
 from shadowpuppet.camera.colour_codes import LEVELS, NUMBER, Codes, step_of, thinned
 from shadowpuppet.camera.mask import Mask, grown
-from shadowpuppet.camera.rasterize import Bits, Picture, count, pack, unpack
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.silhouette_cost import Observation, PartObservation
 

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.segments import dofs_of, limbs_of
 from shadowpuppet.body.upper_body import TWIST
+from shadowpuppet.camera.bits import count, pack
 from shadowpuppet.camera.colour_codes import Codes
 from shadowpuppet.camera.mask import Mask, check_mask
-from shadowpuppet.camera.rasterize import Picture, count, pack
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular import pose_search
 from shadowpuppet.tracking.monocular.arm_colours import WELL, ArmColours, ColourCounts

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from shadowpuppet.body.shapes import Body
+from shadowpuppet.camera.bits import Bits, is_set, pack
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask, grown, may_be_person
+from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.projection import make_lens, pixel_nearest
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
+from shadowpuppet.jit import kernel
 from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, make_cloud
 from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, free_space, reach, spheres_in
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
@@ -32,15 +36,32 @@ class BodyInViews:
         self.pictures = tuple(Picture(body, _half_size(camera), camera.T_camera_world) for camera in cameras)
 
 
+class Halves(NamedTuple):
+    """A frame's masks at half size, by camera; None for a camera without one."""
+
+    masks: tuple[Mask | None, ...]
+    """Every second pixel of every second row, (H / 2, W / 2)."""
+    bits: tuple[Bits | None, ...]
+    """The same as bits."""
+
+    @classmethod
+    def of(cls, masks: Sequence[Mask | None]) -> Halves:
+        """Of masks (H, W)."""
+        small = tuple(None if mask is None else half_size(mask) for mask in masks)
+        return cls(small, tuple(None if mask is None else pack(mask) for mask in small))
+
+
 class MultiviewObservation:
     """One frame: surface points, and the masks (H, W) that they were made from, one per camera, None for a camera without one."""
 
     def __init__(self, views: BodyInViews, surface: SurfacePoints, masks: Sequence[Mask | None], also: Cost | None = None,
-                 left_out: Sequence[Mask | None] = ()) -> None:
+                 left_out: Sequence[Bits | None] = (), halves: Halves | None = None, around: Sequence[Bits] | None = None) -> None:
         """Everything is computed on first use. `also`: a cost of your own (m^2), added to that of the surface. `left_out`: pixels of the
-        views' pictures that are no evidence, one mask per camera or none; surface points there are left out."""
+        views' pictures that are no evidence, bits for each camera or none; surface points there are left out. `halves`: the masks at half
+        size, if known. `around`: the body as expected in each view's picture; free space is computed near it alone."""
         self.views, self.masks, self.also = views, masks, also
         self.left_out = tuple(left_out) or (None,) * len(masks)
+        self.around, self._known_halves = around, halves
         self.surface = _without(surface, views, self.left_out)
 
     def cloud(self, share: int = 1) -> Cloud:
@@ -63,19 +84,27 @@ class MultiviewObservation:
         return tuple(n for n, mask in enumerate(self.masks) if mask is not None and may_be_person(mask))
 
     @cached_property
+    def halves(self) -> Halves:
+        """The masks at half size."""
+        return Halves.of(self.masks) if self._known_halves is None else self._known_halves
+
+    @cached_property
     def people(self) -> tuple[tuple[Picture, Mask], ...]:
         """Each picture in which a person is visible, and its mask at half size."""
-        return tuple((self.views.pictures[n], half_size(self.masks[n])) for n in self.seen)
+        found = [(self.views.pictures[n], self.halves.masks[n]) for n in self.seen]
+        return tuple((picture, mask) for picture, mask in found if mask is not None)
 
     @cached_property
     def silhouettes(self) -> tuple[tuple[Picture, Observation], ...]:
         """The same pictures, with their masks as observations of the silhouette cost."""
-        return tuple((picture, Observation.of(mask, self.left_out[n])) for n, (picture, mask) in zip(self.seen, self.people))
+        found = [(self.views.pictures[n], self.halves.bits[n], self.left_out[n]) for n in self.seen]
+        return tuple((picture, Observation.of_bits(bits, ignored)) for picture, bits, ignored in found if bits is not None)
 
     @cached_property
     def space(self) -> FreeSpace:
         """Distances to the silhouettes' outlines, for the silhouette constraint."""
-        return free_space([(picture.camera, mask) for picture, mask in self.people])
+        around = None if self.around is None else [self.around[n] for n in self.seen]
+        return free_space([(picture.camera, mask) for picture, mask in self.people], around)
 
     @cached_property
     def area(self) -> int:
@@ -108,23 +137,35 @@ class MultiviewObservation:
         return float(np.mean(overlaps)) if len(overlaps) else 0.0
 
 
-def half_size(mask: Mask | None) -> Mask:
+def half_size(mask: Mask) -> Mask:
     """Every second pixel of every second row of a mask (H, W)."""
-    assert mask is not None
     return np.ascontiguousarray(mask[::2, ::2])
 
 
-def _without(surface: SurfacePoints, views: BodyInViews, left_out: Sequence[Mask | None]) -> SurfacePoints:
+def _without(surface: SurfacePoints, views: BodyInViews, left_out: Sequence[Bits | None]) -> SurfacePoints:
     """The surface points but those on contours of pixels (H, W) that are left out."""
     kept = np.ones(len(surface.points), bool)
-    for n, (picture, mask) in enumerate(zip(views.pictures, left_out)):
-        own = np.flatnonzero(surface.cameras == n)
-        if mask is not None and len(own):
-            pixels = np.rint(np.nan_to_num(picture.camera.project(surface.points[own])).clip(-1, 1e6)).astype(int)
-            x, y = pixels.clip(0, np.array(mask.shape[::-1]) - 1).T  # points lie on contours, at most a pixel outside
-            kept[own] = ~grown(mask, 1)[y, x]
-    points, normals, weights, cameras = surface
-    return surface if kept.all() else SurfacePoints(points[kept], normals[kept], weights[kept], cameras[kept])
+    for n, (picture, out) in enumerate(zip(views.pictures, left_out)):
+        if out is not None:
+            camera = picture.camera
+            _leave_out(surface.points, surface.cameras, n, camera.T_camera_world, make_lens(camera), out, camera.size[0], kept)
+    return surface if kept.all() else surface.picked(kept)
+
+
+@kernel
+def _leave_out(points, cameras, camera, T, lens, out, width, kept):  # pragma: no cover
+    """Clear `kept` (P,) of points (P, 3) on a camera's contours that are in pixels (C, H) to leave out, or next to them. Points lie on
+    contours, at most a pixel outside the picture."""
+    height = out.shape[1]
+    for p in range(points.shape[0]):
+        if cameras[p] != camera:
+            continue
+        column, row = pixel_nearest(T, lens, points[p, 0], points[p, 1], points[p, 2])
+        column, row = min(max(column, 0), width - 1), min(max(row, 0), height - 1)
+        for x in range(max(column - 1, 0), min(column + 2, width)):
+            for y in range(max(row - 1, 0), min(row + 2, height)):
+                if is_set(out, x, y):
+                    kept[p] = False
 
 
 def _half_size(camera: Camera) -> Camera:

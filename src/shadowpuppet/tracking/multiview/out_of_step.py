@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shadowpuppet.camera.bits import Bits, count, pack
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.camera.rasterize import Bits, count, pack
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.frozen import LEAST, SetAside
 from shadowpuppet.tracking.multiview.observation import half_size

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from shadowpuppet.camera.bits import Bits
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.camera.rasterize import Bits
 from shadowpuppet.tracking.frozen import CameraWatch, Interval, is_blind
 from shadowpuppet.tracking.multiview.out_of_step import StepWatch
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.body.shapes import Body
+from shadowpuppet.camera.bits import pack
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
@@ -130,9 +131,9 @@ class MultiviewTracker:
     def observe(self, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
                 also: Cost | None = None) -> MultiviewObservation:
         """The observation of a frame's masks (H, W) after `state`, without what is left out beside its pose. Arguments as in `step`."""
-        left_out = [None if each is None else each.beside(picture.mask(state.pose))
-                    for each, picture in zip(state.unexplained, self.views.pictures)]
-        return MultiviewObservation(self.views, points, masks, also, left_out)
+        beside = [None if each is None else each.beside(picture.mask(state.pose))
+                  for each, picture in zip(state.unexplained, self.views.pictures)]
+        return MultiviewObservation(self.views, points, masks, also, [None if pixels is None else pack(pixels) for pixels in beside])
 
     def unexplained(self, last: Sequence[Unexplained | None], masks: Sequence[Mask | None],
                     state: MultiviewState) -> tuple[Unexplained | None, ...]:

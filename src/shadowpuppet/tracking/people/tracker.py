@@ -12,9 +12,11 @@ import numpy as np
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.body.whole_body import GLOBAL_DOFS
+from shadowpuppet.camera.bits import Bits, count
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.threads import usable_cores
+from shadowpuppet.tracking.multiview.observation import Halves
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import gathered
@@ -24,14 +26,12 @@ from shadowpuppet.tracking.people.evidence import (
     PersonObservation,
     draw_person,
     ignored_pixels,
-    picked,
     predicted,
 )
 from shadowpuppet.tracking.people.facing import CLEARLY
 from shadowpuppet.tracking.people.figures import Figure
 from shadowpuppet.tracking.people.walking import TURN
 from shadowpuppet.tracking.recovery import settle
-from shadowpuppet.tracking.unexplained import near
 
 TOUCHING = 0.25
 """Distance of two people's bodies below which they are estimated twice in a frame: the second time on evidence divided by the first."""
@@ -73,8 +73,8 @@ class Share(NamedTuple):
     """This person's silhouettes (H, W), one per camera."""
     drawn: Drawn
     """The body in its new pose."""
-    ignored: Sequence[Mask | None] = ()
-    """Pixels (H / 2, W / 2) of each camera that say nothing of this person."""
+    ignored: Sequence[Bits | None] = ()
+    """Pixels of each camera's picture of half the size that say nothing of this person."""
 
 
 def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Mask | None],
@@ -86,12 +86,13 @@ def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Ma
     whose poses in this frame are known.
     """
     drawn = {n: draw_person(person.tracker, predicted(person.tracker.body, person.state)) for n, person in people.items()}
-    evidence = Division({**drawn, **beside}, {n for n, person in people.items() if person.state.status == "lost"}, points, masks)
+    lost, halves = {n for n, person in people.items() if person.state.status == "lost"}, Halves.of(masks)
+    evidence = Division({**drawn, **beside}, lost, points, masks, halves)
 
     def follow(n: int, evidence: Division) -> tuple[MultiviewState, Drawn]:
         tracker, rng, state = people[n]
         own, ignored = evidence.of(n)
-        observation = PersonObservation(tracker.views, own, masks, ignored, evidence.drawn[n])
+        observation = PersonObservation(tracker.views, own, masks, None, ignored, halves, evidence.drawn[n].bits)
         state = _judged(tracker.follow(rng, state, observation))
         return state, draw_person(tracker, state.pose)
 
@@ -116,12 +117,12 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
     mine = np.linalg.norm(points.points[:, :2] - figure.place, axis=1) < ROUND_FIGURE
     for other in drawn.values():
         mine &= other.distances(points.points) > 0.05
-    own = picked(points, mine)
+    own = points.picked(mine)
     if not person.is_present(PersonObservation(person.views, own, masks)):
         return None
     rough = person.search(rng, PersonObservation(person.views, own, [None] * len(masks)))  # the points alone: where the person is
     body = draw_person(person, rough.pose)
-    observation = PersonObservation(person.views, own, masks, ignored_pixels(body, list(drawn.values()), masks))
+    observation = PersonObservation(person.views, own, masks, left_out=ignored_pixels(body, list(drawn.values()), masks))
     found = person.search(rng, observation)  # beside others front and back hardly differ: both are tried
     other = _facing_the_other_way(person, rng, found, observation)
     best = max(found, other, key=lambda state: np.nan_to_num(state.overlap))
@@ -146,13 +147,13 @@ def follow_turned(person: MultiviewTracker, rng: np.random.Generator, state: Mul
 
 def views_apart(share: Share) -> list[int]:
     """Indices of the cameras that show most of a person's body where no other person's is."""
-    return [n for n, (body, ignored) in enumerate(zip(share.drawn.masks, share.ignored))
-            if ignored is not None and body.any() and np.count_nonzero(body & ~ignored) >= SHOWN * np.count_nonzero(body)]  # fmt: skip
+    return [n for n, (body, ignored) in enumerate(zip(share.drawn.bits, share.ignored))
+            if ignored is not None and body.any() and count(body & ~ignored) >= SHOWN * count(body)]  # fmt: skip
 
 
 def is_shown(share: Share) -> bool:
     """Whether enough views show most of a person apart from others: three, or all of fewer cameras."""
-    return len(views_apart(share)) >= min(VIEWS, len(share.drawn.masks))
+    return len(views_apart(share)) >= min(VIEWS, len(share.drawn.bits))
 
 
 def shows_side(person: MultiviewTracker, share: Share) -> bool:
@@ -176,7 +177,7 @@ def keep_front(person: MultiviewTracker, rng: np.random.Generator, before: Multi
 
 def observed(person: MultiviewTracker, share: Share) -> PersonObservation:
     """What a share shows of a person, as it was followed."""
-    return PersonObservation(person.views, share.points, share.masks, share.ignored)
+    return PersonObservation(person.views, share.points, share.masks, left_out=share.ignored)
 
 
 def _facing_the_other_way(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState,
@@ -215,11 +216,9 @@ def touching(drawn: Mapping[int, Drawn]) -> list[int]:
     return sorted(close)
 
 
-def explained(drawn: Mapping[int, Drawn], number: int) -> list[Mask]:
-    """Pixels (H / 2, W / 2) of each of a `number` of cameras that people's bodies explain; empty without people."""
-    if not drawn:
-        return []
-    return [np.logical_or.reduce([near(one.masks[n]) for one in drawn.values()]) for n in range(number)]
+def explained(drawn: Mapping[int, Drawn]) -> list[Mask]:
+    """Pixels (H / 2, W / 2) of each camera that people's bodies explain; empty without people."""
+    return [np.logical_or.reduce(masks) for masks in zip(*(one.masks_near() for one in drawn.values()))]
 
 
 def _judged(state: MultiviewState) -> MultiviewState:

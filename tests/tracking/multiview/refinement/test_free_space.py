@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt, map_coordinates
 
+from shadowpuppet.camera.bits import pack
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
 from shadowpuppet.tracking.multiview.refinement.free_space import (
@@ -107,7 +108,7 @@ def test_near_a_body_distances_are_those_of_the_whole_picture_and_where_no_silho
     bodies = [mask.copy() for _, mask in views]
     for _, mask in views:
         mask[:, :60] = mask[:, -60:] = True  # other people
-    near, whole = free_space(views, bodies), free_space(views)
+    near, whole = free_space(views, list(map(pack, bodies))), free_space(views)
     assert len(near.fields) < 0.8 * len(whole.fields)
     for spread in (0.02, 0.1):
         T = of.skeleton.forward(of.skeleton.clamp((pose + rng.normal(0, spread, len(pose)))[None]))[0]
@@ -116,7 +117,7 @@ def test_near_a_body_distances_are_those_of_the_whole_picture_and_where_no_silho
     elsewhere[:20, :20] = True
     for body in (bodies[0], np.zeros_like(bodies[0])):  # with no silhouette near it, or not in the picture
         far = [(views[0][0], elsewhere)]
-        np.testing.assert_array_equal(free_space(far, [body]).windows, free_space(far).windows)
+        np.testing.assert_array_equal(free_space(far, [pack(body)]).windows, free_space(far).windows)
 
 
 def test_an_arm_that_reaches_out_is_brought_back_without_any_surface_to_draw_it(rng):

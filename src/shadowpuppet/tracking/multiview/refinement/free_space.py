@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Limbs
+from shadowpuppet.camera.bits import Bits, count, window_of_bits
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, Window, bounding_window
 from shadowpuppet.camera.projection import NEAR_PLANE, bend_within, make_lens
@@ -74,9 +75,9 @@ def spheres_in(limbs: Limbs, lengths: Array | None = None) -> Spheres:
     return Spheres(np.array(joints), np.array(places), np.array(radii), np.array(which))
 
 
-def free_space(views: Sequence[tuple[Camera, Mask]], around: Sequence[Mask] | None = None) -> FreeSpace:
-    """Distances for cameras and their masks (H, W); every mask shows a person. `around`: of each the pixels (H, W) of the body whose limbs
-    are looked at, so that distances are computed near them alone; None: all around the silhouettes."""
+def free_space(views: Sequence[tuple[Camera, Mask]], around: Sequence[Bits] | None = None) -> FreeSpace:
+    """Distances for cameras and their masks (H, W); every mask shows a person. `around`: of each the pixels of the body whose limbs are
+    looked at, so that distances are computed near them alone; None: all around the silhouettes."""
     fields, windows, start = [np.zeros(0, np.float32)], [], 0
     for (camera, mask), body in zip(views, around or (None,) * len(views), strict=True):
         rows, columns = _window(mask, body)
@@ -95,10 +96,10 @@ def free_space(views: Sequence[tuple[Camera, Mask]], around: Sequence[Mask] | No
     )
 
 
-def _window(mask: Mask, body: Mask | None) -> Window:
-    """Rows and columns around a silhouette (H, W), or around a body (H, W) where silhouette is near it."""
-    if body is not None and (area := np.count_nonzero(body)):
-        window = bounding_window(body, max(WINDOW_MARGIN, round(BODY_MARGIN * area**0.5)))
+def _window(mask: Mask, body: Bits | None) -> Window:
+    """Rows and columns around a silhouette (H, W), or around a body where silhouette is near it."""
+    if body is not None and (area := count(body)):
+        window = window_of_bits(body, max(WINDOW_MARGIN, round(BODY_MARGIN * area**0.5)))
         if mask[window].any():
             return window
     return bounding_window(mask, WINDOW_MARGIN)

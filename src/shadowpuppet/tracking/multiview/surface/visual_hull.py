@@ -41,6 +41,10 @@ class SurfacePoints(NamedTuple):
     cameras: NDArray[np.int64]
     """Index of the camera on whose contour each point lies, of shape (P,)."""
 
+    def picked(self, which: NDArray[np.bool_]) -> SurfacePoints:
+        """Some of the points, (P,) true or false."""
+        return SurfacePoints(self.points[which], self.normals[which], self.weights[which], self.cameras[which])
+
 
 class _View(NamedTuple):
     """Arrays of a camera for the kernels."""

@@ -1,0 +1,141 @@
+"""Masks packed as bits `[word_column][row]`, 64 pixels of a row in a 64-bit word, so that inner loops run over rows and vectorise."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shadowpuppet.camera.mask import Window
+from shadowpuppet.jit import device, kernel
+
+Bits = NDArray[np.uint64]
+
+
+def pack(mask: ArrayLike) -> Bits:
+    """Bits (ceil(W / 64), H) of a mask (H, W)."""
+    mask = np.asarray(mask, bool)
+    height, width = mask.shape
+    padded = np.zeros((height, -(-width // 64) * 64), bool)
+    padded[:, :width] = mask
+    words = np.packbits(padded, axis=1, bitorder="little").view("<u8")
+    return np.ascontiguousarray(words.T, np.uint64)
+
+
+def unpack(bits: Bits, width: int) -> NDArray[np.bool_]:
+    """The mask (H, W) of bits (C, H)."""
+    rows = np.ascontiguousarray(bits.T).astype("<u8").view(np.uint8)
+    return np.unpackbits(rows, axis=1, bitorder="little")[:, :width].astype(bool)
+
+
+def count(bits: Bits) -> int:
+    """Number of set pixels."""
+    return int(np.bitwise_count(bits).sum())
+
+
+def grown_bits(bits: Bits, by: int, width: int) -> Bits:
+    """Bits (C, H) of a mask `width` pixels wide, grown by a number of pixels to all sides, corners included."""
+    out = bits.copy()
+    _grow(out, by, width, np.empty_like(bits))
+    return out
+
+
+def window_of_bits(bits: Bits, margin: int) -> Window:
+    """Bounding box of the set pixels of bits (C, H), with a margin (pixels); empty without a set pixel."""
+    words = np.bitwise_or.reduce(bits, axis=1).tolist()
+    columns = sum(word << 64 * n for n, word in enumerate(words))
+    if not columns:
+        return slice(0, 0), slice(0, 0)
+    rows = np.flatnonzero(np.bitwise_or.reduce(bits, axis=0))
+    first, last = (columns & -columns).bit_length() - 1, columns.bit_length()
+    return slice(max(int(rows[0]) - margin, 0), int(rows[-1]) + 1 + margin), slice(max(first - margin, 0), last + margin)
+
+
+@device
+def is_set(bits, x, y):  # pragma: no cover
+    """Whether pixel (x, y), which must be in the picture, is set."""
+    return (bits[x >> 6, y] >> np.uint64(x & 63)) & np.uint64(1) != 0
+
+
+@kernel
+def _grow(bits, by, width, room):  # pragma: no cover
+    """Grow bits (C, H) in place; `room`: (C, H). To each side alone: what leaves the picture does not come back."""
+    words, height = bits.shape
+    _copy(bits, room)
+    _spread_right(bits, by)
+    _spread_left(room, by)
+    _unite(bits, room)
+    _copy(bits, room)
+    _spread_down(bits, by)
+    _spread_up(room, by)
+    _unite(bits, room)
+    if width & 63:
+        inside = (np.uint64(1) << np.uint64(width & 63)) - np.uint64(1)
+        for r in range(height):
+            bits[words - 1, r] &= inside
+
+
+@device
+def _copy(bits, out):  # pragma: no cover
+    for c in range(bits.shape[0]):
+        for r in range(bits.shape[1]):
+            out[c, r] = bits[c, r]
+
+
+@device
+def _unite(bits, other):  # pragma: no cover
+    for c in range(bits.shape[0]):
+        for r in range(bits.shape[1]):
+            bits[c, r] |= other[c, r]
+
+
+@device
+def _spread_right(bits, by):  # pragma: no cover
+    """Spread bits (C, H) by a number of pixels: what is spread by n, moved by at most n + 1 and laid over itself, is spread by both."""
+    reach, words = 0, bits.shape[0]
+    while reach < by:
+        step = min(reach + 1, by - reach)
+        q, low, high = step >> 6, np.uint64(step & 63), np.uint64(64 - (step & 63))
+        for c in range(words - 1, q - 1, -1):
+            for r in range(bits.shape[1]):
+                bits[c, r] |= bits[c - q, r] << low
+            if low and c > q:
+                for r in range(bits.shape[1]):
+                    bits[c, r] |= bits[c - q - 1, r] >> high
+        reach += step
+
+
+@device
+def _spread_left(bits, by):  # pragma: no cover
+    reach, words = 0, bits.shape[0]
+    while reach < by:
+        step = min(reach + 1, by - reach)
+        q, low, high = step >> 6, np.uint64(step & 63), np.uint64(64 - (step & 63))
+        for c in range(words - q):
+            for r in range(bits.shape[1]):
+                bits[c, r] |= bits[c + q, r] >> low
+            if low and c + q + 1 < words:
+                for r in range(bits.shape[1]):
+                    bits[c, r] |= bits[c + q + 1, r] << high
+        reach += step
+
+
+@device
+def _spread_down(bits, by):  # pragma: no cover
+    reach, height = 0, bits.shape[1]
+    while reach < by:
+        step = min(reach + 1, by - reach)
+        for c in range(bits.shape[0]):
+            for r in range(height - 1, step - 1, -1):
+                bits[c, r] |= bits[c, r - step]
+        reach += step
+
+
+@device
+def _spread_up(bits, by):  # pragma: no cover
+    reach, height = 0, bits.shape[1]
+    while reach < by:
+        step = min(reach + 1, by - reach)
+        for c in range(bits.shape[0]):
+            for r in range(height - step):
+                bits[c, r] |= bits[c, r + step]
+        reach += step
