@@ -21,7 +21,7 @@ from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import fit_monocular
 from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.pipeline.survey.camera import survey_camera
-from shadowpuppet.tracking.monocular.arm_colours import ColourCounts
+from shadowpuppet.tracking.arm_colours import ColourCounts
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker

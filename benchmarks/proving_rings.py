@@ -32,7 +32,7 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import Sizes
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
@@ -40,6 +40,7 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, fit_multiview
 from shadowpuppet.pipeline.rig import open_rig, read_frames
+from shadowpuppet.pipeline.silhouette_cache import MaskStore
 from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.synthetic import Spec, proving_rings
 from shadowpuppet.synthetic.person.mannequin import Kind, Mannequin
@@ -57,6 +58,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "weighted mean": {"estimate": "mean"},
     "no silhouettes": {"silhouettes": 0.0},
     "silhouettes / 4": {"silhouettes": 0.025},
+    "no colours of arms": {"arm_colours": 0.0},
     "no local search": {"local": 0},
     "no training, height x 1.05": {"training": False, "height": 1.05},
     "no training, sizes x 1.05": {"training": False, "sizes": 1.05},
@@ -98,28 +100,23 @@ def scaled(name: str, sizes: Sizes, factor: float) -> Body:
 
 
 class Case:
-    """A recording read once: silhouettes as bits, surface points and measured people by the settings that they depend on."""
+    """A recording read once: silhouettes and colours, surface points and measured people by the settings that they depend on."""
 
     def __init__(self, path: Path, masks: bool, frames: int) -> None:
         """`masks`: the exact ones; `frames`: so many at most."""
         self.rig = open_rig(path, make_options({"masks": masks}))
         self.survey = survey_rig(self.rig, make_options({"masks": masks}))
         truth = read_joints(self.rig.recording.truth)  # pyright: ignore[reportArgumentType]
-        self.times, self.bits = [], []
+        self.times, self.store = list[float](), MaskStore(limit=10**12)
         for seen in read_frames(self.rig, [each.following() for each in self.survey.silhouettes], ready=masks):
             self.times.append(seen.time)
-            self.bits.append([None if mask is None else (np.packbits(mask), mask.shape) for mask in seen.masks])
+            self.store.add(seen.time, seen.masks, codes=tuple(map(colour_codes, seen.corrected)))
             if len(self.times) == frames:
                 break
         known = truth.times <= self.times[-1] + 1e-6
         self.truth = JointTable(truth.times[known], truth.names, truth.positions[known])
         self.hulls: dict[str, tuple[list[SurfacePoints], float]] = {}
         self.subjects: dict[str, MultiviewSubject] = {}
-
-    def masks(self) -> list[list[Mask | None]]:
-        """Those of every frame, one after the other."""
-        return [[None if one is None else np.unpackbits(one[0], count=np.prod(one[1])).reshape(one[1]).astype(bool) for one in seen]
-                for seen in self.bits]
 
     def run(self, values: Mapping[str, Any], seed: int) -> dict[str, Any]:
         """Measures of one row and seed."""
@@ -136,14 +133,15 @@ class Case:
         known = self.subjects[key].tracker
         body = known.body if larger == 1 else scaled(settings.body, self.subjects[key].person.sizes, larger)
         tracker = replace(known, body=body, settings=settings, prior=known.prior if settings.method == "hybrid" else None)
-        masks = self.masks()
+        sets = list(self.store)
         if (at := repr(settings.hull)) not in self.hulls:
             hull, start = VisualHull(self.rig.cameras, settings.hull), time.process_time()
-            self.hulls[at] = [hull.points(seen) for seen in masks], time.process_time() - start
+            self.hulls[at] = [hull.points(seen.masks) for seen in sets], time.process_time() - start
         points, spent = self.hulls[at]
         rng, state, poses, start = np.random.default_rng([seed, 1]), None, list[Array](), time.process_time()
-        for surface, seen in zip(points, masks):
-            state = tracker.start(rng, surface, seen) if state is None else tracker.step(rng, state, surface, seen)
+        for surface, seen in zip(points, sets):
+            state = (tracker.start(rng, surface, seen.masks) if state is None
+                     else tracker.step(rng, state, surface, seen.masks, codes=seen.codes))  # fmt: skip
             poses.append(np.where(state.status in ("lost", "absent"), np.nan, state.pose))
         spent += time.process_time() - start
         shown = np.array(poses)

@@ -126,7 +126,7 @@ def test_names_that_settings_of_several_cameras_offer_are_those_there_are():
 
 
 @pytest.mark.parametrize(("overrides", "said"), [
-    ({"particle": 3}, "multiview: unknown setting 'particle'; there are: arms, body, cooling, cycles"),
+    ({"particle": 3}, "multiview: unknown setting 'particle'; there are: arm_colours, arms, body, cooling, cycles"),
     ({"surface": {"far": 3}}, "multiview: unknown setting 'surface.far'; there are: epsilon, nearest, tau"),
     ({"particles": 0}, "multiview: particles: found 0; input should be greater than or equal to 1"),
     ({"defensive": 1.5}, "defensive: found 1.5; input should be less than or equal to 1"), ({"keep": -0.1}, "keep: found -0.1"),

@@ -35,7 +35,7 @@ class Follower:
         self.calls.append("start")
         return self._there(rng, points, masks)
 
-    def step(self, rng, state, points, masks) -> Standing:
+    def step(self, rng, state, points, masks, codes=()) -> Standing:
         self.calls.append("step")
         return self._there(rng, points, masks) if len(points.points) else state._replace(status="lost")
 

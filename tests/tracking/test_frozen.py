@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.tracking.frozen import FROZEN_FRAMES, CameraWatch, is_frozen, same_silhouette
-from shadowpuppet.tracking.multiview.rig_watch import RigWatch
+from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 
 RATE = 20
 

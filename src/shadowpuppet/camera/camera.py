@@ -152,6 +152,11 @@ class Camera:
         xy = np.asarray(xy, float).reshape(-1, 2)
         return np.concatenate([xy, np.ones((len(xy), 1))], 1).reshape(*pixels.shape[:-1], 3)
 
+    def thinned(self, step: int) -> Camera:
+        """The camera of pictures that keep every `step`-th pixel of every `step`-th row."""
+        width, height = self.size
+        return replace(self, size=(-(-width // step), -(-height // step)), matrix=np.diag([1 / step, 1 / step, 1.0]) @ self.matrix)
+
     def resized(self, size: tuple[int, int]) -> Camera:
         """The same camera for pictures scaled to `size` (pixel centres stay at integers, so the principal point moves by halves)."""
         sx, sy = size[0] / self.size[0], size[1] / self.size[1]

@@ -24,7 +24,7 @@ from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.subject import TrackedSubject, motion_frame
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
-from shadowpuppet.tracking.multiview.rig_watch import RigWatch
+from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 from shadowpuppet.tracking.smoothing.fixed_lag import FixedLag
 from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
 from shadowpuppet.video import Image

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import TrackingError
@@ -29,8 +30,8 @@ from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body
 from shadowpuppet.pipeline.survey.opening import OPENED, OPENING
 from shadowpuppet.tracking.frozen import LEAST
-from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
+from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 from shadowpuppet.video import Image
 
 STEP_IN = "step in between the cameras and move a little"
@@ -236,6 +237,7 @@ class RigSession(LiveSession):
         found = [None if image is None else segment(CameraFrame(shot.captured, image, None))
                  for segment, image in zip(self._segment, images)]
         self._own = tuple(None if each is None else each.mask for each in found)
+        self._codes = tuple(None if each is None else colour_codes(each.image) for each in found)
         return self._share(found)
 
     def _forget_time(self) -> None:

@@ -22,6 +22,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.pipeline.rig import FrameSet, Rig, read_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes
@@ -52,6 +53,8 @@ class Task:
     """Whether `FrameSet.images` are wanted."""
     corrected: bool = True
     """Whether `FrameSet.corrected` are wanted, at half size: every second pixel of every second row."""
+    codes: bool = False
+    """Whether `FrameSet.codes` of several cameras are wanted."""
     hull: VisualHull | None = None
     """Computes `FrameSet.points`; None: they are not wanted."""
 
@@ -64,7 +67,8 @@ class Task:
                 points = None if self.hull is None else self.hull.points(seen.masks)
                 images = seen.images if self.images else (None,) * len(seen.images)
                 corrected = tuple(None if each is None else each[::2, ::2].copy() for each in seen.corrected) if self.corrected else ()
-                yield seen._replace(images=images, corrected=corrected, points=points, carving=time.perf_counter() - begin)
+                codes = tuple(map(colour_codes, seen.corrected)) if self.codes and seen.corrected else seen.codes
+                yield seen._replace(images=images, corrected=corrected, codes=codes, points=points, carving=time.perf_counter() - begin)
 
     @property
     def is_long(self) -> bool:

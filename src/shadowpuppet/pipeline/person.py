@@ -32,11 +32,11 @@ from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject
 from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.silhouette.boundary import disc
+from shadowpuppet.tracking.arm_colours import ColourCounts
 from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.tracking.doubt.monocular import Before, MonocularDoubt
 from shadowpuppet.tracking.doubt.steps import Trail
-from shadowpuppet.tracking.monocular.arm_colours import ColourCounts
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate

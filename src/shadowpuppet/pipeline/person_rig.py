@@ -30,6 +30,7 @@ from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.pipeline.subject import Observed, TrackedSubject, TrackerState
 from shadowpuppet.silhouette.added import BesideBody
+from shadowpuppet.tracking.arm_colours import ColourCounts
 from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.multiview import Before, MultiviewDoubt
 from shadowpuppet.tracking.doubt.steps import Trail
@@ -54,6 +55,8 @@ class HullObservation(NamedTuple):
     masks: Sequence[Mask | None]
     people: int
     """Number of cameras in which the silhouette may be a person's."""
+    codes: Sequence[Codes | None] = ()
+    """`FrameSet.codes`."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,11 +67,11 @@ class MultiviewSubject(TrackedSubject):
     hull: VisualHull
     is_measured: bool = True
     """Whether the sizes are the person's own, not average ones."""
-    state_types = (MultiviewState, Particles, Unexplained, Before, Trail)
+    state_types = (MultiviewState, Particles, Unexplained, ColourCounts, Before, Trail)
 
     def observe(self, masks: Sequence[Mask | None], codes: Sequence[Codes | None] = ()) -> HullObservation:
-        """Surface points of the visual hull of the masks, and the masks."""
-        return HullObservation(self.hull.points(masks), masks, sum(mask is not None and may_be_person(mask) for mask in masks))
+        """Surface points of the visual hull of the masks, the masks, and their colours."""
+        return HullObservation(self.hull.points(masks), masks, sum(mask is not None and may_be_person(mask) for mask in masks), codes)
 
     def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed]:
         """Observations of frame sets; another thread makes the next one while one is tracked."""
@@ -84,10 +87,12 @@ class MultiviewSubject(TrackedSubject):
 
         After None the first pose is searched for again, once two cameras see a person.
         """
-        points, masks, people = observation
+        points, masks, people, codes = observation
         if people == 0 or (state is None and people < 2):
             return None
-        return self.tracker.start(rng, points, masks) if state is None else self.tracker.step(rng, state, points, masks)
+        if state is None:
+            return self.tracker.start(rng, points, masks)
+        return self.tracker.step(rng, state, points, masks, codes=codes)
 
     def left_out(self, state: MultiviewState | None) -> tuple[Mask | None, ...]:
         """For each camera the pixels (H, W), at half size, that a state leaves out of the silhouettes; None for none."""

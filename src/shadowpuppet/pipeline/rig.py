@@ -71,7 +71,7 @@ class FrameSet(NamedTuple):
     shadows: tuple[Mask | None, ...] = ()
     """As in `Seen`."""
     codes: tuple[Codes | None, ...] = ()
-    """Coarse colours (`camera.colour_codes`) in place of `corrected`, with one camera."""
+    """Coarse colours (`camera.colour_codes`) of these images; of several cameras only where they are wanted."""
     points: SurfacePoints | None = None
     """Surface points of the visual hull of `masks`; None: not computed."""
     carving: float = 0.0

@@ -82,7 +82,7 @@ class TrackedSubject(ABC):
 
     @abstractmethod
     def observe(self, masks: Sequence[Mask | None], codes: Sequence[Codes | None] = ()) -> Any:
-        """The tracker's observation of one frame set's silhouettes, and, with one camera, of their colours (`FrameSet.codes`)."""
+        """The tracker's observation of one frame set's silhouettes, and of their colours (`FrameSet.codes`)."""
 
     @abstractmethod
     def next_state(self, rng: np.random.Generator, state: Any, observation: Any) -> Any:

@@ -48,7 +48,7 @@ from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body, floor_entry, joint_names, motion_frame
 from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.tracking.multiview.rig_watch import RigWatch
+from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 from shadowpuppet.tracking.smoothing.butterworth import check_cutoff
 from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother, smoothed_parts
 from shadowpuppet.video import write_frames
@@ -232,7 +232,7 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
     try:
         with ExitStack() as stack:
             overlay = stack.enter_context(write_frames(writer.folder / "overlay.mp4", rate / options.every)) if options.overlay else None
-            task = Task(survey.rig, survey.silhouettes, options.masks, options.every, images=options.overlay, corrected=False)
+            task = Task(survey.rig, survey.silhouettes, options.masks, options.every, images=options.overlay, corrected=False, codes=True)
             frames = stack.enter_context(closing(frames_beside(task)))
             if cache is not None:
                 frames = stack.enter_context(closing(cache.frames(frames, options)))

@@ -9,7 +9,7 @@ from solids import looking
 
 from shadowpuppet.camera.bits import pack
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, _half_size
+from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 
 NOTHING = SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))
@@ -31,7 +31,7 @@ def poses_beside(rng, number: int = 5) -> np.ndarray:
 
 def plain(stage, masks, pose) -> tuple[int, int, list[float]]:
     """Pixels that differ and pixels of silhouettes, of every second row and column, and each picture's overlap."""
-    drawn = [Picture(actor.body(), _half_size(camera), camera.T_camera_world).mask(pose) for camera in actor.cameras()]
+    drawn = [Picture(actor.body(), camera.thinned(2), camera.T_camera_world).mask(pose) for camera in actor.cameras()]
     pairs = [(d, m[::2, ::2]) for d, m in zip(drawn, masks) if m is not None and m.any()]
     differing, area = sum(int((d ^ m).sum()) for d, m in pairs), sum(int(m.sum()) for _, m in pairs)
     return differing, area, [(d & m).sum() / (d | m).sum() for d, m in pairs]
@@ -40,7 +40,7 @@ def plain(stage, masks, pose) -> tuple[int, int, list[float]]:
 @pytest.mark.parametrize("size", [(160, 120), (161, 121), (7, 6)])
 def test_a_thinned_camera_has_every_second_pixel(size, rng):
     camera = looking((3, 1, 0.5), size=size, focal=200.0, distortion=(-0.1, 0.02, 0.001, 0.0))
-    half, points = _half_size(camera), rng.uniform(-0.5, 0.5, (20, 3)) @ np.eye(3)
+    half, points = camera.thinned(2), rng.uniform(-0.5, 0.5, (20, 3)) @ np.eye(3)
     there = points @ camera.T_camera_world[:3, :3].T + camera.T_camera_world[:3, 3]
     assert half.size == np.zeros(size[::-1])[::2, ::2].shape[::-1]
     np.testing.assert_allclose(2 * half.project(there), camera.project(there), atol=1e-6)

@@ -55,8 +55,8 @@ from shadowpuppet.pipeline.subject import joint_names, motion_frame
 from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.frozen import Interval
-from shadowpuppet.tracking.multiview.rig_watch import RigWatch
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
+from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 from shadowpuppet.tracking.people.exchanges import given_back
 from shadowpuppet.tracking.people.facing import Doubted
 from shadowpuppet.tracking.people.presence import Followed

@@ -16,8 +16,8 @@ from shadowpuppet.camera.colour_codes import Codes
 from shadowpuppet.camera.mask import Mask, check_mask
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.arm_colours import WELL, ArmColours, ColourCounts
 from shadowpuppet.tracking.monocular import pose_search
-from shadowpuppet.tracking.monocular.arm_colours import WELL, ArmColours, ColourCounts
 from shadowpuppet.tracking.monocular.extended_stage import make_stage
 from shadowpuppet.tracking.monocular.leg_postures import FLOOR_WEIGHT, floor_below, floor_cost, posture_penalty
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale

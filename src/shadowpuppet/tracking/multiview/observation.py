@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -33,7 +32,7 @@ class BodyInViews:
         """`cameras`: calibrated, with known poses in the world."""
         assert body.limbs is not None
         self.body, self.limbs = body, body.limbs
-        self.pictures = tuple(Picture(body, _half_size(camera), camera.T_camera_world) for camera in cameras)
+        self.pictures = tuple(Picture(body, camera.thinned(2), camera.T_camera_world) for camera in cameras)
 
 
 class Halves(NamedTuple):
@@ -166,9 +165,3 @@ def _leave_out(points, cameras, camera, T, lens, out, width, kept):  # pragma: n
             for y in range(max(row - 1, 0), min(row + 2, height)):
                 if is_set(out, x, y):
                     kept[p] = False
-
-
-def _half_size(camera: Camera) -> Camera:
-    """The camera of pictures that keep every second pixel of every second row."""
-    width, height = camera.size
-    return replace(camera, size=((width + 1) // 2, (height + 1) // 2), matrix=np.diag([0.5, 0.5, 1.0]) @ camera.matrix)

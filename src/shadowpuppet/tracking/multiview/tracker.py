@@ -13,18 +13,20 @@ import numpy as np
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.bits import pack
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.colour_codes import Codes
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview import arm_postures, body_postures, pose_search
+from shadowpuppet.tracking.multiview.arms_in_views import ArmsInViews, Counts
 from shadowpuppet.tracking.multiview.local_search import LocalSearch
 from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, half_size
-from shadowpuppet.tracking.multiview.odd_camera import adapted, odd_one, suspects
 from shadowpuppet.tracking.multiview.posture_prior import PosturePrior
 from shadowpuppet.tracking.multiview.proposals import Proposals
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refine, Refiner
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.watch.odd_camera import adapted, odd_one, suspects
 from shadowpuppet.tracking.particle_filter import Particles, Weigh, better_of, evaluate
 from shadowpuppet.tracking.recovery import OVERLAP_DROP, settle, track_or_recover
 from shadowpuppet.tracking.resampling import Scheme, make_scheme, normalise, with_best
@@ -32,6 +34,8 @@ from shadowpuppet.tracking.silhouette_cost import Cost
 from shadowpuppet.tracking.status import status_of
 from shadowpuppet.tracking.unexplained import Unexplained, look_beside
 
+WELL = 0.75
+"""Least overlap of body and silhouettes at which colours are learnt."""
 MIN_POINTS, MIN_EXTENT = 50, 0.5
 """Smallest number and smallest extent (m) of the surface points of a person."""
 FEW_CAMERAS, MANY_CAMERAS = 4, 6
@@ -61,6 +65,8 @@ class MultiviewState(NamedTuple):
     """What each camera's silhouettes, at half size, have beside the body; empty if nothing is left out."""
     usual: Array = np.zeros(0)
     """Overlap in each camera's picture as it has been (C,), NaN without a silhouette so far; empty at the beginning."""
+    colours: Counts = ()
+    """The colours that have been seen on the arms and elsewhere, by camera."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,17 +91,19 @@ class MultiviewTracker:
     """Surface points of masks (H, W), one per camera: computed again without a camera that contradicts the others; None: all count."""
 
     def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
-             also: Cost | None = None) -> MultiviewState:
+             also: Cost | None = None, codes: Sequence[Codes | None] = ()) -> MultiviewState:
         """The state after a new frame's surface points, and the masks (H, W) that they were made from, one per camera.
 
         If no person is visible the pose is held; after a loss the person is searched for (`recover`). `also`: a cost of your own, poses
-        (N, D) to m^2 (N,), added to that of the surface.
+        (N, D) to m^2 (N,), added to that of the surface. `codes`: the pictures' colours (`colour_codes`), one array per camera, if the arms
+        may be found by them.
         """
-        observation = self.observe(state, points, masks, also)
+        observation = self.observe(state, points, masks, also, codes)
         found = self.follow(rng, state, observation)
         if self.carve is not None:
             found = self._without_odd_one(rng, state, found, observation)
-        return found._replace(unexplained=self.unexplained(state.unexplained, masks, found)) if self.looks else found
+        found = found._replace(unexplained=self.unexplained(state.unexplained, masks, found)) if self.looks else found
+        return found._replace(colours=self.learnt(state.colours, codes, masks, found)) if self.settings.arm_colours else found
 
     def _without_odd_one(self, rng: np.random.Generator, state: MultiviewState, found: MultiviewState,
                          observation: MultiviewObservation) -> MultiviewState:
@@ -129,11 +137,27 @@ class MultiviewTracker:
         return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent")
 
     def observe(self, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
-                also: Cost | None = None) -> MultiviewObservation:
+                also: Cost | None = None, codes: Sequence[Codes | None] = ()) -> MultiviewObservation:
         """The observation of a frame's masks (H, W) after `state`, without what is left out beside its pose. Arguments as in `step`."""
+        also = self._with_arms(also, state, masks, codes)
         beside = [None if each is None else each.beside(picture.mask(state.pose))
                   for each, picture in zip(state.unexplained, self.views.pictures)]
         return MultiviewObservation(self.views, points, masks, also, [None if pixels is None else pack(pixels) for pixels in beside])
+
+    def _with_arms(self, also: Cost | None, state: MultiviewState, masks: Sequence[Mask | None],
+                  codes: Sequence[Codes | None]) -> Cost | None:
+        """A caller's cost with that of what has the arms' colours and that no arm covers. Arguments as in `step`."""
+        weight = self.settings.arm_colours
+        arms = self.arms_in_views.uncovered(state.colours, codes, masks, state.pose) if weight and state.colours and codes else None
+        if arms is None:
+            return also
+        return lambda poses: weight * arms(poses) + (0 if also is None else also(poses))
+
+    def learnt(self, colours: Counts, codes: Sequence[Codes | None], masks: Sequence[Mask | None], state: MultiviewState) -> Counts:
+        """The colours seen so far, with those in a new state's frame, of its masks (H, W), if the estimate fits well."""
+        if not codes or state.status != "tracked" or state.overlap < WELL:
+            return colours
+        return self.arms_in_views.learnt(colours, codes, masks, state.pose)
 
     def unexplained(self, last: Sequence[Unexplained | None], masks: Sequence[Mask | None],
                     state: MultiviewState) -> tuple[Unexplained | None, ...]:
@@ -258,6 +282,11 @@ class MultiviewTracker:
     def views(self) -> BodyInViews:
         """The body in the cameras' pictures."""
         return BodyInViews(self.body, self.cameras)
+
+    @cached_property
+    def arms_in_views(self) -> ArmsInViews:
+        """Finds the arms by their colours."""
+        return ArmsInViews(self.body, self.cameras)
 
     @cached_property
     def refiner(self) -> Refiner:

@@ -1,4 +1,4 @@
-"""Arms before the trunk, found by the colours of this person's hands, and of their forearms if these are bare. Not in Liu 2011.
+"""Arms before the trunk, found by the colours of this person's hands, and of their forearms if these are bare. In neither paper.
 
 A silhouette does not show where an arm is before the trunk; its colours do, be they a skin's or a glove's. They are counted where hands and
 forearms are beside the trunk, in the tracked poses, and compared with those of trunk and legs. If they differ, the pixels that have the
@@ -66,7 +66,7 @@ class ArmColours:
     def learnt(self, counts: ColourCounts | None, codes: Codes, mask: Mask, pose: Array) -> ColourCounts:
         """The counts with those of one more frame, of its mask (H, W) and the pose (D,) found in it."""
         last = ColourCounts(*np.zeros((3, NUMBER), np.int64)) if counts is None else counts
-        hand, forearm, upper, head, rest = (thinned(self._drawn(pose, kind)) for kind in KINDS)
+        hand, forearm, upper, head, rest = (thinned(self.drawn(pose, kind)) for kind in KINDS)
         others, arms = rest | head | upper, hand | forearm | upper
         shown = (hand & ~others, grown(forearm, -EDGE) & ~grown(others, EDGE), grown(rest, -EDGE) & ~grown(arms, ABOUT_ARMS) & ~head)
         own = thinned(mask)
@@ -81,18 +81,17 @@ class ArmColours:
         kinds, of_arms = distinct(counts, "hand" if len(self._shapes["hand"]) else "forearm")
         if not kinds:
             return None
-        step = step_of(self.picture.camera.size)
-        found = grown(grown(of_arms[codes] & thinned(mask), -1), 1)  # without single pixels
+        step, found = step_of(self.picture.camera.size), coloured(of_arms, codes, thinned(mask))
         found = found.repeat(step, 0).repeat(step, 1)[: mask.shape[0], : mask.shape[1]] & mask
-        apart = grown(self._drawn(pose, "head"), ABOUT_HEAD * step) | ~self._before_trunk(found, pose, step)
+        apart = grown(self.drawn(pose, "head"), ABOUT_HEAD * step) | ~self._before_trunk(found, pose, step)
         ignored = ignore | pack(apart) | self.picture.leg_bits(pose)
-        return PartObservation(Observation(pack(found) | ignored, ignored), tuple(self._names(kinds)))
+        return PartObservation(Observation(pack(found) | ignored, ignored), tuple(self.parts_of(kinds)))
 
     def _before_trunk(self, found: Mask, pose: Array, step: int) -> Mask:
         """The trunk of a pose (D,), and what is about the parts of a mask (H, W) that reach over it."""
         import cv2
 
-        trunk = self._drawn(pose, "rest")
+        trunk = self.drawn(pose, "rest")
         number, parts = cv2.connectedComponents(found.view(np.uint8))
         labels = np.asarray(parts, np.intp)
         over = np.bincount(labels[trunk & found], minlength=number) >= OVER_TRUNK * step**2
@@ -110,7 +109,7 @@ class ArmColours:
         areas = {arm: count(own) for arm, own in drawn.items()}
         return {arm: min((count(own & ~found) + over) / areas[arm], MOST_MISMATCH) for arm, own in drawn.items() if areas[arm]}
 
-    def _drawn(self, pose: Array, kind: str) -> Mask:
+    def drawn(self, pose: Array, kind: str) -> Mask:
         """The parts of a kind in a pose (D,), as a mask (H, W)."""
         return unpack(self.picture.draw(pose, self._shapes[kind]), self.picture.camera.size[0])
 
@@ -120,13 +119,22 @@ class ArmColours:
         kinds = [kind_of(part) for part in self.picture.body.parts]
         return {kind: np.flatnonzero([each == kind for each in kinds]) for kind in KINDS}
 
-    def _names(self, kinds: Iterable[str]) -> list[str]:
+    def shapes_of(self, kinds: Iterable[str]) -> NDArray[np.int64]:
+        """Indices of the body's shapes of some kinds."""
+        return np.concatenate([self._shapes[kind] for kind in kinds])
+
+    def parts_of(self, kinds: Iterable[str]) -> list[str]:
         """Names of the parts of some kinds."""
         return [part for part in dict.fromkeys(self.picture.body.parts) if kind_of(part) in kinds]
 
 
 KINDS = ("hand", "forearm", "upper_arm", "head", "rest")
 """Kinds of parts whose colours may differ; `rest`: trunk and legs."""
+
+
+def coloured(of_arms: NDArray[np.bool_], codes: Codes, mask: Mask) -> Mask:
+    """The pixels of a mask (h, w) whose colours (h, w) are those of arms, (4096,), without single pixels."""
+    return grown(grown(of_arms[codes] & mask, -1), 1)
 
 
 def kind_of(part: str) -> str:

@@ -7,7 +7,7 @@ import pytest
 
 from shadowpuppet.camera.bits import pack
 from shadowpuppet.tracking.frozen import LEAST
-from shadowpuppet.tracking.multiview.out_of_step import AHEAD, ENOUGH, LAGS, LATE, MEMORY, MISFIT, MOST, OTHERS, PACE, StepWatch
+from shadowpuppet.tracking.multiview.watch.out_of_step import AHEAD, ENOUGH, LAGS, LATE, MEMORY, MISFIT, MOST, OTHERS, PACE, StepWatch
 
 RATE, FRAMES = 20, 80
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from shadowpuppet.camera.bits import Bits
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.tracking.frozen import CameraWatch, Interval, is_blind
-from shadowpuppet.tracking.multiview.out_of_step import StepWatch
+from shadowpuppet.tracking.multiview.watch.out_of_step import StepWatch
 
 
 class RigWatch:

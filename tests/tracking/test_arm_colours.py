@@ -15,8 +15,8 @@ from people import camera, picture, shapes_of
 from shadowpuppet.camera.bits import unpack
 from shadowpuppet.camera.colour_codes import NUMBER, Codes, colour_codes, step_of, thinned
 from shadowpuppet.camera.rasterize import Picture
+from shadowpuppet.tracking.arm_colours import ENOUGH, ENOUGH_REST, ArmColours, ColourCounts, distinct, kind_of
 from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
-from shadowpuppet.tracking.monocular.arm_colours import ENOUGH, ENOUGH_REST, ArmColours, ColourCounts, distinct, kind_of
 from shadowpuppet.tracking.monocular.settings import make_settings
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 

@@ -8,9 +8,9 @@ import actor
 import numpy as np
 import pytest
 
-from shadowpuppet.tracking.multiview.odd_camera import adapted, odd_one, suspects
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
+from shadowpuppet.tracking.multiview.watch.odd_camera import adapted, odd_one, suspects
 
 USUAL = np.array([0.9, 0.85, 0.9, 0.8])
 JUMP, FRAMES = 6, 9
