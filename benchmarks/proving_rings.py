@@ -59,6 +59,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "no silhouettes": {"silhouettes": 0.0},
     "silhouettes / 4": {"silhouettes": 0.025},
     "no colours of arms": {"arm_colours": 0.0},
+    "colours of arms": {"arm_colours": 0.1},
     "no local search": {"local": 0},
     "no training, height x 1.05": {"training": False, "height": 1.05},
     "no training, sizes x 1.05": {"training": False, "sizes": 1.05},

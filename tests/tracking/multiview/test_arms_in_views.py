@@ -11,7 +11,7 @@ import pytest
 from shadowpuppet.camera.bits import unpack
 from shadowpuppet.camera.colour_codes import step_of, thinned
 from shadowpuppet.tracking.arm_colours import kind_of
-from shadowpuppet.tracking.multiview.arms_in_views import ArmsInViews
+from shadowpuppet.tracking.multiview.arms_in_views import PLENTY, ArmsInViews
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
@@ -86,6 +86,14 @@ def test_a_camera_without_a_picture_or_a_person_says_nothing():
     assert arms().learnt((), codes, [None] * len(masks), POSE) == (None,) * len(masks)
 
 
+def test_a_camera_that_knows_enough_learns_no_more():
+    counts, (masks, codes) = counted(), seen(POSE)
+    enough = counts[0]._replace(hand=counts[0].hand * PLENTY)
+    found = arms().learnt((enough, *counts[1:]), codes, masks, POSE)
+    assert found[0] is enough
+    assert all(one.rest.sum() > other.rest.sum() for one, other in zip(found[1:], counts[1:]))
+
+
 @pytest.mark.parametrize("given", [{"bare": ("upper_arm",)}, {"shirt": SKIN}])
 def test_gloves_of_the_shirts_colour_say_nothing(given):
     masks, codes = seen(POSE, **given)
@@ -107,7 +115,7 @@ def test_a_shadow_of_that_colour_far_from_the_arms_does_not_count():
 
 
 def test_a_tracker_learns_colours_and_uses_them_and_without_pictures_nothing_changes():
-    tracker = MultiviewTracker(BODY, actor.cameras(), MultiviewSettings(particles=6))
+    tracker = MultiviewTracker(BODY, actor.cameras(), MultiviewSettings(particles=6, arm_colours=0.1))
     off = MultiviewTracker(BODY, actor.cameras(), MultiviewSettings(particles=6, arm_colours=0.0))
     shown = {}
     for name, each, given in (("colours", tracker, True), ("none", tracker, False), ("off", off, True)):
@@ -124,3 +132,8 @@ def test_a_tracker_learns_colours_and_uses_them_and_without_pictures_nothing_cha
 
 def test_kinds_are_those_of_this_body():
     assert {kind_of(part) for part in BODY.parts} >= {"hand", "forearm", "upper_arm", "head", "rest"}
+
+
+@pytest.mark.parametrize(("cameras", "chosen", "weight"), [(3, None, 0.1), (4, None, 0.1), (5, None, 0.0), (5, 0.2, 0.2), (3, 0.0, 0.0)])
+def test_few_cameras_look_for_colours(cameras, chosen, weight):
+    assert MultiviewTracker(BODY, actor.cameras()[:cameras], MultiviewSettings(arm_colours=chosen)).arm_colours == weight

@@ -22,6 +22,8 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.arm_colours import ENOUGH, ArmColours, ColourCounts, coloured, distinct
 from shadowpuppet.tracking.silhouette_cost import Cost
 
+PLENTY = 5000
+"""Number of pixels of hands after which a camera learns no more."""
 ARM = ("hand", "forearm", "upper_arm")
 MOST = 1.5
 """Greatest area with the hands' colours, over that of both arms as drawn last: more is something else, too."""
@@ -43,10 +45,14 @@ class ArmsInViews:
         self.views = tuple(ArmColours(Picture(body, camera, camera.T_camera_world)) for camera in thin)
 
     def learnt(self, counts: Counts, codes: Sequence[Codes | None], masks: Sequence[Mask | None], pose: Array) -> Counts:
-        """The counts with those of one more frame, of its masks (H, W) and the pose (D,) found in it."""
-        before = counts or (None,) * len(self.views)
-        return tuple(known if seen is None or mask is None or not may_be_person(mask) else view.learnt(known, seen, thinned(mask), pose)
-                     for view, known, seen, mask in zip(self.views, before, codes, masks, strict=True))  # fmt: skip
+        """The counts with those of one more frame, of its masks (H, W) and the pose (D,) found in it; as they are where enough is known."""
+        found = list[ColourCounts | None]()
+        for view, known, seen, mask in zip(self.views, counts or (None,) * len(self.views), codes, masks, strict=True):
+            if seen is None or mask is None or not may_be_person(mask) or (known is not None and known.hand.sum() >= PLENTY):
+                found.append(known)
+            else:
+                found.append(view.learnt(known, seen, thinned(mask), pose))
+        return tuple(found)
 
     def uncovered(self, counts: Counts, codes: Sequence[Codes | None], masks: Sequence[Mask | None], last: Array) -> Cost | None:
         """The pixels of a frame's masks (H, W) that have the colours of arms and that the arms of poses (N, D) do not cover, as shares (N,)

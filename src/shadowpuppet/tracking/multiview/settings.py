@@ -138,9 +138,10 @@ class MultiviewSettings:
     limbs: NonNegative = 1e-4
     """Weight (m^2) of how rare the posture of arms, legs and trunk together is among people, in units of a log density, bounded. It chooses
     between postures that few cameras do not tell apart."""
-    arm_colours: NonNegative = 0.1
+    arm_colours: NonNegative | None = None
     """Weight (m^2) of the share of the silhouettes' pixels that have the colours of this person's hands and bare forearms and that no arm
-    covers. The colours are learnt from the film where they differ from the clothes'. 0: not looked for."""
+    covers. The colours are learnt from the film where they differ from the clothes'. 0: not looked for. Default: 0.1 with four cameras or
+    fewer; more show arms well enough."""
     cycles: Annotated[int, Field(ge=1, le=100)] | None = None
     """Estimation cycles per frame (annealing). None: one for each 1/30 s that a frame lasts, at most four; one when live."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6

@@ -34,6 +34,8 @@ from shadowpuppet.tracking.silhouette_cost import Cost
 from shadowpuppet.tracking.status import status_of
 from shadowpuppet.tracking.unexplained import Unexplained, look_beside
 
+ARM_COLOURS = 0.1
+"""`MultiviewSettings.arm_colours` of few cameras."""
 WELL = 0.75
 """Least overlap of body and silhouettes at which colours are learnt."""
 MIN_POINTS, MIN_EXTENT = 50, 0.5
@@ -103,7 +105,7 @@ class MultiviewTracker:
         if self.carve is not None:
             found = self._without_odd_one(rng, state, found, observation)
         found = found._replace(unexplained=self.unexplained(state.unexplained, masks, found)) if self.looks else found
-        return found._replace(colours=self.learnt(state.colours, codes, masks, found)) if self.settings.arm_colours else found
+        return found._replace(colours=self.learnt(state.colours, codes, masks, found)) if self.arm_colours else found
 
     def _without_odd_one(self, rng: np.random.Generator, state: MultiviewState, found: MultiviewState,
                          observation: MultiviewObservation) -> MultiviewState:
@@ -147,7 +149,7 @@ class MultiviewTracker:
     def _with_arms(self, also: Cost | None, state: MultiviewState, masks: Sequence[Mask | None],
                   codes: Sequence[Codes | None]) -> Cost | None:
         """A caller's cost with that of what has the arms' colours and that no arm covers. Arguments as in `step`."""
-        weight = self.settings.arm_colours
+        weight = self.arm_colours
         arms = self.arms_in_views.uncovered(state.colours, codes, masks, state.pose) if weight and state.colours and codes else None
         if arms is None:
             return also
@@ -277,6 +279,12 @@ class MultiviewTracker:
         if self.settings.method == "image_force":
             return 1
         return self.settings.particles or PARTICLES[bisect((FEW_CAMERAS + 1, MANY_CAMERAS), len(self.cameras))]
+
+    @cached_property
+    def arm_colours(self) -> float:
+        """Weight (m^2) of what has the arms' colours and no arm covers."""
+        chosen, few = self.settings.arm_colours, len(self.cameras) <= FEW_CAMERAS
+        return chosen if chosen is not None else ARM_COLOURS if few else 0.0
 
     @cached_property
     def views(self) -> BodyInViews:
