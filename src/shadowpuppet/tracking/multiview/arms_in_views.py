@@ -63,13 +63,11 @@ class ArmsInViews:
                 continue
             small = thinned(mask)
             area += int(np.count_nonzero(small))
-            of_hands = None if known is None or colours is None else _of_hands(known)
-            if known is None or colours is None or of_hands is None:
+            if known is None or colours is None or (of_hands := _of_hands(known)) is None:
                 continue
-            kinds = _covering(known, of_hands)
             found = coloured(of_hands, colours, small) & _where_arms_may_be(view, last)
             if 0 < np.count_nonzero(found) <= MOST * sum(np.count_nonzero(view.drawn(last, kind)) for kind in ARM):
-                seen.append((view.picture, view.shapes_of(kinds), pack(found)))
+                seen.append((view.picture, view.shapes_of(_covering(known, of_hands)), pack(found)))
 
         def uncovered(poses: Array) -> Array:
             left = np.zeros(len(poses))
