@@ -21,8 +21,8 @@ import shadowpuppet as sp
 from papers.common.plotting import COLOURS, label, new_figure, save_picture
 from shadowpuppet.body.sizes import SUBSETS
 from shadowpuppet.body.upper_body import cardbox
+from shadowpuppet.camera.bits import unpack
 from shadowpuppet.camera.drawing import draw_model, matching
-from shadowpuppet.camera.rasterize import unpack
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.synthetic import Gesture, Scene, Spec, synthesize
 from shadowpuppet.tracking.monocular.initialization import POSTURES, fit_references
