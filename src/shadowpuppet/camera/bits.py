@@ -58,16 +58,26 @@ def is_set(bits, x, y):  # pragma: no cover
 
 @kernel
 def _grow(bits, by, width, room):  # pragma: no cover
-    """Grow bits (C, H) in place; `room`: (C, H). To each side alone: what leaves the picture does not come back."""
+    """Grow bits (C, H) in place; `room`: (C, H). To each side alone: what leaves the picture does not come back. What is grown by n, moved
+    by at most n + 1 and laid over itself, is grown by both."""
     words, height = bits.shape
-    _copy(bits, room)
-    _spread_right(bits, by)
-    _spread_left(room, by)
-    _unite(bits, room)
-    _copy(bits, room)
-    _spread_down(bits, by)
-    _spread_up(room, by)
-    _unite(bits, room)
+    for sideways in (True, False):
+        for c in range(words):
+            for r in range(height):
+                room[c, r] = bits[c, r]
+        reach = 0
+        while reach < by:
+            step = min(reach + 1, by - reach)
+            if sideways:
+                _lay_right(bits, step)
+                _lay_left(room, step)
+            else:
+                _lay_below(bits, step)
+                _lay_above(room, step)
+            reach += step
+        for c in range(words):
+            for r in range(height):
+                bits[c, r] |= room[c, r]
     if width & 63:
         inside = (np.uint64(1) << np.uint64(width & 63)) - np.uint64(1)
         for r in range(height):
@@ -75,67 +85,40 @@ def _grow(bits, by, width, room):  # pragma: no cover
 
 
 @device
-def _copy(bits, out):  # pragma: no cover
-    for c in range(bits.shape[0]):
+def _lay_right(bits, step):  # pragma: no cover
+    """Lay bits (C, H), moved to the right by some pixels, over themselves."""
+    q, low, high = step >> 6, np.uint64(step & 63), np.uint64(64 - (step & 63))
+    for c in range(bits.shape[0] - 1, q - 1, -1):
         for r in range(bits.shape[1]):
-            out[c, r] = bits[c, r]
+            bits[c, r] |= bits[c - q, r] << low
+        if low and c > q:
+            for r in range(bits.shape[1]):
+                bits[c, r] |= bits[c - q - 1, r] >> high
 
 
 @device
-def _unite(bits, other):  # pragma: no cover
-    for c in range(bits.shape[0]):
+def _lay_left(bits, step):  # pragma: no cover
+    """The same to the left."""
+    q, low, high = step >> 6, np.uint64(step & 63), np.uint64(64 - (step & 63))
+    for c in range(bits.shape[0] - q):
         for r in range(bits.shape[1]):
-            bits[c, r] |= other[c, r]
-
-
-@device
-def _spread_right(bits, by):  # pragma: no cover
-    """Spread bits (C, H) by a number of pixels: what is spread by n, moved by at most n + 1 and laid over itself, is spread by both."""
-    reach, words = 0, bits.shape[0]
-    while reach < by:
-        step = min(reach + 1, by - reach)
-        q, low, high = step >> 6, np.uint64(step & 63), np.uint64(64 - (step & 63))
-        for c in range(words - 1, q - 1, -1):
+            bits[c, r] |= bits[c + q, r] >> low
+        if low and c + q + 1 < bits.shape[0]:
             for r in range(bits.shape[1]):
-                bits[c, r] |= bits[c - q, r] << low
-            if low and c > q:
-                for r in range(bits.shape[1]):
-                    bits[c, r] |= bits[c - q - 1, r] >> high
-        reach += step
+                bits[c, r] |= bits[c + q + 1, r] << high
 
 
 @device
-def _spread_left(bits, by):  # pragma: no cover
-    reach, words = 0, bits.shape[0]
-    while reach < by:
-        step = min(reach + 1, by - reach)
-        q, low, high = step >> 6, np.uint64(step & 63), np.uint64(64 - (step & 63))
-        for c in range(words - q):
-            for r in range(bits.shape[1]):
-                bits[c, r] |= bits[c + q, r] >> low
-            if low and c + q + 1 < words:
-                for r in range(bits.shape[1]):
-                    bits[c, r] |= bits[c + q + 1, r] << high
-        reach += step
+def _lay_below(bits, step):  # pragma: no cover
+    """The same down."""
+    for c in range(bits.shape[0]):
+        for r in range(bits.shape[1] - 1, step - 1, -1):
+            bits[c, r] |= bits[c, r - step]
 
 
 @device
-def _spread_down(bits, by):  # pragma: no cover
-    reach, height = 0, bits.shape[1]
-    while reach < by:
-        step = min(reach + 1, by - reach)
-        for c in range(bits.shape[0]):
-            for r in range(height - 1, step - 1, -1):
-                bits[c, r] |= bits[c, r - step]
-        reach += step
-
-
-@device
-def _spread_up(bits, by):  # pragma: no cover
-    reach, height = 0, bits.shape[1]
-    while reach < by:
-        step = min(reach + 1, by - reach)
-        for c in range(bits.shape[0]):
-            for r in range(height - step):
-                bits[c, r] |= bits[c, r + step]
-        reach += step
+def _lay_above(bits, step):  # pragma: no cover
+    """The same up."""
+    for c in range(bits.shape[0]):
+        for r in range(bits.shape[1] - step):
+            bits[c, r] |= bits[c, r + step]

@@ -7,7 +7,7 @@ does not see an arm that the trunk hides.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from shadowpuppet.camera.colour_codes import Codes, step_of, thinned
 from shadowpuppet.camera.mask import Mask, grown, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.arm_colours import ENOUGH, ArmColours, ColourCounts, coloured, distinct
+from shadowpuppet.tracking.arm_colours import ENOUGH, KINDS, ArmColours, ColourCounts, coloured, distinct
 from shadowpuppet.tracking.silhouette_cost import Cost
 
 PLENTY = 5000
@@ -65,8 +65,9 @@ class ArmsInViews:
             area += int(np.count_nonzero(small))
             if known is None or colours is None or (of_hands := _of_hands(known)) is None:
                 continue
-            found = coloured(of_hands, colours, small) & _where_arms_may_be(view, last)
-            if 0 < np.count_nonzero(found) <= MOST * sum(np.count_nonzero(view.drawn(last, kind)) for kind in ARM):
+            drawn = {kind: view.drawn(last, kind) for kind in KINDS}
+            found = coloured(of_hands, colours, small) & _where_arms_may_be(drawn)
+            if 0 < np.count_nonzero(found) <= MOST * sum(np.count_nonzero(drawn[kind]) for kind in ARM):
                 seen.append((view.picture, view.shapes_of(_covering(known, of_hands)), pack(found)))
 
         def uncovered(poses: Array) -> Array:
@@ -79,15 +80,15 @@ class ArmsInViews:
         return uncovered if seen else None
 
 
-def _where_arms_may_be(view: ArmColours, pose: Array) -> Mask:
-    """Pixels (h, w) in which the hands of a pose (D,) may be in the next frame."""
-    arms = view.drawn(pose, "hand") | view.drawn(pose, "forearm")
-    return (grown(arms, ABOUT_ARMS) | view.drawn(pose, "rest")) & ~grown(view.drawn(pose, "head"), ABOUT_HEAD)
+def _where_arms_may_be(drawn: Mapping[str, Mask]) -> Mask:
+    """Pixels (h, w) in which the hands may be in the next frame; `drawn`: the body's parts in this one (h, w), by kind."""
+    return (grown(drawn["hand"] | drawn["forearm"], ABOUT_ARMS) | drawn["rest"]) & ~grown(drawn["head"], ABOUT_HEAD)
 
 
 def _of_hands(counts: ColourCounts) -> NDArray[np.bool_] | None:
     """Whether each colour (4096,) is one of the hands, and of bare forearms, which are alike; None if hands do not differ from the clothes.
-    Forearms' own colours may be the shirt's, of which their sleeve hides a part from the count of the rest."""
+    The colours of forearms themselves are not used: under a long sleeve they are the shirt's, and may seem rare on the trunk while a camera
+    has seen little of it."""
     kinds, found = distinct(counts._replace(forearm=np.zeros_like(counts.forearm)))
     return found if kinds else None
 
