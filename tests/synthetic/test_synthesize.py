@@ -141,6 +141,13 @@ def test_a_made_recording_can_be_made_again_from_its_spec(tmp_path):
         np.testing.assert_array_equal(frames(first / name), frames(second / name))
 
 
+def test_the_encoder_has_one_thread_so_that_a_film_is_the_same_every_time(tmp_path):
+    spec = replace(SMALL, cameras=(Viewpoint(size=(320, 320)),))  # of one with fewer blocks libx264 would not take several
+    folder = synthesize(spec, tmp_path / "made", np.random.default_rng(1))
+    for name in ("video/cam.mp4", "background/cam.mp4"):
+        assert b" threads=1 " in (folder / name).read_bytes()  # libx264's own note of its settings
+
+
 @pytest.mark.parametrize(("text", "told"), [
     ("fog = 1", r"spec\.toml: fog: no such setting; possible are begin, body, cameras, faults, frames, motion"),
     ("[scene]\nfog = 1", r"scene\.fog: no such setting; possible are background, bystanders"),

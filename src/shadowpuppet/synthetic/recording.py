@@ -168,7 +168,7 @@ def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: Figure, tell
     _shoot_empty(folder, spec, studio)
     interrupted = False
     with contextlib.ExitStack() as stack:
-        film = stack.enter_context(write_frames(folder / "video" / f"{name}.mp4", spec.rate, crf=crf(spec.scene.crf, empty=False)))
+        film = stack.enter_context(write_frames(folder / "video" / f"{name}.mp4", spec.rate, crf=crf(spec.scene.crf, empty=False), threads=1))
         kinds = ["masks", *["people"][: len(spec.scene.bystanders)]]
         exact = [stack.enter_context(write_frames(folder / kind / f"{name}.mkv", spec.rate, lossless=True)) for kind in kinds]
         try:
@@ -194,7 +194,7 @@ def _shoot_empty(folder: Path, spec: Spec, studio: SceneRenderer) -> None:
     if spec.scene.empty_seconds == 0:
         return
     crf, path = studio.faults.crf(spec.scene.crf, empty=True), folder / "background" / f"{studio.room.camera.name}.mp4"
-    with write_frames(path, spec.rate, crf=crf) as film:
+    with write_frames(path, spec.rate, crf=crf, threads=1) as film:
         count = max(1, round(spec.scene.empty_seconds * spec.rate))
         for index in range(count):
             film.write(studio.empty(index, count))

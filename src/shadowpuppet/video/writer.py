@@ -24,7 +24,8 @@ BT601, STUDIO_RANGE = 6, 1
 """FFmpeg's AVCOL_SPC_SMPTE170M and AVCOL_RANGE_MPEG, stated so that players need not guess the conversion of colours."""
 
 
-def write_frames(path: str | Path, rate: float, *, size: Size | None = None, lossless: bool = False, crf: int = CRF) -> FrameWriter:
+def write_frames(path: str | Path, rate: float, *, size: Size | None = None, lossless: bool = False, crf: int = CRF,
+                 threads: int = 0) -> FrameWriter:
     """Write a film of `rate` frames/s: `with write_frames("film.mp4", 25) as film: film.write(image)`.
 
     The codec is H.264 (.mp4, .mov, .mkv; odd sizes are made even by repeating the last row or column), or FFV1 if `lossless` (.mkv; grey
@@ -37,6 +38,8 @@ def write_frames(path: str | Path, rate: float, *, size: Size | None = None, los
         size: width and height to which pictures are scaled.
         lossless: write FFV1.
         crf: constant rate factor of H.264, 0 to 51.
+        threads: threads of the encoder, 0: as many as it likes. Then libx264's film depends on the machine's cores and, if pictures are
+            tiny, on chance (1 film in 300 of 64 x 48 pixels differs); with 1 it is the same every time.
     """
     path, endings = Path(path), [".mkv"] if lossless else [".mkv", ".mov", ".mp4"]
     if path.suffix not in endings:
@@ -44,15 +47,15 @@ def write_frames(path: str | Path, rate: float, *, size: Size | None = None, los
         raise VideoError(f"{path}: found the ending {path.suffix!r}, a {kind} is written to {' or '.join(endings)}")
     if not 0.01 <= rate <= 10_000:
         raise VideoError(f"{path}: rate: found {rate}, expected 0.01 to 10000 frames/s")
-    return FrameWriter(path, rate, size, lossless, crf)
+    return FrameWriter(path, rate, size, lossless, crf, threads)
 
 
 class FrameWriter:
     """Writes a film within its `with` block; made by `write_frames`."""
 
-    def __init__(self, path: Path, rate: float, size: Size | None, lossless: bool, crf: int = CRF) -> None:
+    def __init__(self, path: Path, rate: float, size: Size | None, lossless: bool, crf: int = CRF, threads: int = 0) -> None:
         """The file is created at the first picture."""
-        self.crf = crf
+        self.crf, self.threads = crf, threads
         self.path, self.partial = path, path.with_name(f"{path.stem}.part{path.suffix}")
         self.rate, self.size, self.lossless = Fraction(rate).limit_denominator(1001), size, lossless
         self.count, self._stamp = 0, -1
@@ -126,7 +129,7 @@ class FrameWriter:
         stream: Any = container.add_stream(codec, rate=self.rate, options=settings)
         stream.width, stream.height = size_of(image)
         stream.pix_fmt = "yuv420p" if not self.lossless else "gray" if image.ndim == 2 else "bgr0"
-        stream.codec_context.time_base = self._base
+        stream.codec_context.time_base, stream.codec_context.thread_count = self._base, self.threads
         if not self.lossless:
             stream.codec_context.colorspace, stream.codec_context.color_range = BT601, STUDIO_RANGE
         self._stream = stream
