@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import tomllib
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.body.whole_body import anatomical
-from shadowpuppet.errors import NOTED
+from shadowpuppet.errors import HARMFUL, NOTED
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
@@ -25,6 +26,8 @@ from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.tracking.multiview.settings import for_smeared
+from shadowpuppet.tracking.multiview.size_estimation import Front
+from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
 FRAMES = 16
 QUICK = {"masks": True, "multiview": {"particles": 16}, "training": {"regions": 6, "starts": 1}}
@@ -141,6 +144,29 @@ def test_an_estimated_height_is_doubted_where_the_body_fits_badly():
     assert "height, 1.83 m, may be off by 20 cm: the body overlaps the silhouettes by 0.72 only" in said
     assert (said.short, said.weight) == ("height is uncertain: give --height", NOTED)
     assert len(said.short.split()) <= 10
+
+
+def test_a_front_that_hardly_fits_better_is_doubted():
+    assert person_rig._front_doubts(None) == ()
+    assert person_rig._front_doubts(Front(0.0, np.zeros(3), 0.05)) == ()
+    (said,) = person_rig._front_doubts(Front(0.0, np.zeros(3), 0.012))
+    assert "which way the person faces is uncertain" in said
+    assert "about as well (1 % worse)" in said
+    assert said.weight == HARMFUL
+    assert len(said.short.split()) <= 10
+
+
+def test_the_first_search_is_about_a_doubted_front(untaught, monkeypatch):
+    options, facing = make_options(QUICK), []
+    survey = survey_rig(open_rig(untaught, options), options)
+    subject = person_rig.fit_multiview(np.random.default_rng(0), survey, options)
+    start = MultiviewTracker.start
+    monkeypatch.setattr(MultiviewTracker, "start", lambda self, *given, **named: facing.append(named) or start(self, *given, **named))
+    seen = [subject.observe(masks) for masks in survey.first.masks[:2]]
+    doubted = dataclasses.replace(subject, front=Front(0.3, seen[0].points.points.mean(0), 0.1))
+    for person, observation in ((subject, seen[0]), (doubted, seen[0]), (doubted, seen[1])):
+        person.next_state(np.random.default_rng(0), None, observation)
+    assert facing == [{"facing": None}, {"facing": 0.3}, {"facing": None}]
 
 
 def test_only_a_height_that_was_estimated_is_doubted(untaught, monkeypatch):

@@ -164,11 +164,12 @@ def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: Figure, tell
     """
     from shadowpuppet.video import write_frames
 
-    name, crf, hidden, seen = studio.room.camera.name, studio.faults.crf, 0, 0
+    name, hidden, seen = studio.room.camera.name, 0, 0
+    crf = studio.faults.crf(spec.scene.crf, empty=False)
     _shoot_empty(folder, spec, studio)
     interrupted = False
     with contextlib.ExitStack() as stack:
-        film = stack.enter_context(write_frames(folder / "video" / f"{name}.mp4", spec.rate, crf=crf(spec.scene.crf, empty=False), threads=1))
+        film = stack.enter_context(write_frames(folder / "video" / f"{name}.mp4", spec.rate, crf=crf, threads=1))
         kinds = ["masks", *["people"][: len(spec.scene.bystanders)]]
         exact = [stack.enter_context(write_frames(folder / kind / f"{name}.mkv", spec.rate, lossless=True)) for kind in kinds]
         try:

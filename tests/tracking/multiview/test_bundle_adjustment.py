@@ -76,8 +76,8 @@ def test_a_step_is_that_of_all_equations_at_once(damping, rng):
     poses[:, body.skeleton.dof_names.index("flexion")] = 1.0
     start, pull, sizes = poses + 0.01 * rng.normal(size=poses.shape), rng.uniform(0, 0.1, poses.shape), rng.normal(size=6)
     free, tight, strain, scale = np.array([0, 2, 3, 5]), rng.uniform(0.1, 1, K), rng.normal(size=K), 1e3
-    solution = bundle_adjustment._Solution((sizes, poses), 0.0, frames, strain, body)
-    found = bundle_adjustment._moved(solution, free, np.diag(tight), scale, start, pull, damping)
+    solution = bundle_adjustment._Solution((sizes, poses), 0.0, frames, scale * np.diag(tight), strain, body)
+    found = bundle_adjustment._moved(solution, free, scale, start, pull, damping)
     A, b = np.zeros((F * D + K, F * D + K)), np.zeros(F * D + K)
     last = F * D + np.arange(K)
     for f, frame in enumerate(frames):
@@ -154,6 +154,18 @@ def test_sizes_without_a_deviation_stay_as_they_are():
     found = solve_bundle(anatomical, MEAN, spread, near, clouds, rounds=3)
     for name, wide in zip(NAMES, spread):
         assert (getattr(found.sizes, name) == getattr(MEAN, name)) == (wide == 0), name
+
+
+def test_sizes_may_deviate_more_to_one_side_than_to_the_other():
+    """Upper arms are shorter than expected, thighs longer."""
+    near, clouds = shown()[2:]
+    tight = 1e-3 * SPREAD
+    smaller = solve_bundle(anatomical, MEAN, np.array([SPREAD, tight]), near, clouds)
+    larger = solve_bundle(anatomical, MEAN, np.array([tight, SPREAD]), near, clouds)
+    assert smaller.sizes.upper_arm_length < MEAN.upper_arm_length - 0.01
+    assert larger.sizes.upper_arm_length == pytest.approx(MEAN.upper_arm_length, abs=1e-3)
+    assert larger.sizes.thigh_length > MEAN.thigh_length + 0.01
+    assert smaller.sizes.thigh_length == pytest.approx(MEAN.thigh_length, abs=1e-3)
 
 
 def test_with_no_size_free_the_poses_alone_are_solved_for():

@@ -37,7 +37,8 @@ def fit_apart(rng: np.random.Generator, cameras: Sequence[Camera], floor: Floor,
     if len(apart) >= min(MIN_SETS, len(seen)):
         chosen = [apart[n] for n in evenly_spread(len(apart), MOST_SETS)]
         with contextlib.suppress(TrackingError):
-            subject = fit_in_views(rng, cameras, chosen, replace(options, height=None), rate, tall)
+            # fronts are found while people are tracked
+            subject = fit_in_views(rng, cameras, chosen, replace(options, height=None), rate, tall, both_fronts=False)
     return unsettled(subject or average_person(rng, cameras, options, rate, tall))
 
 

@@ -58,15 +58,17 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
                  spaces: Sequence[FreeSpace] = (), emptiness: float = 0.0) -> Bundle[Measured]:
     """Sizes and poses that fit the surface points of F frames, by damped Gauss-Newton from poses (F, D) and sizes `first` or `expected`.
 
-    `spread` (K,): standard deviations (m) of the expected sizes, 0 for fixed ones. `shared` (S, K): deviations that sizes have together,
+    `spread` (K,): standard deviations (m) of the expected sizes, 0 for fixed ones; (2, K) of what is smaller and what is larger than
+    expected. `shared` (S, K): deviations that sizes have together,
     each row for one standard deviation of a common cause, such as the stature. `spaces`, one per frame, and `emptiness`: silhouettes that
     limbs must not reach out of, as in `Pass`. `pull`, one or (F, D): weight of the squared distance from `centre` (F, D; default: `poses`),
     as in `Refiner.gauss_newton`. `worth`: effective number of independent points per frame.
     """
     settings, start, about = settings or SurfaceSettings(), poses if centre is None else centre, expected.to_array()
     pull = np.broadcast_to(pull, poses.shape)
-    free, scale = np.flatnonzero(spread > 0), worth / POINT_NOISE**2
-    tight = _precision(spread, shared)[np.ix_(free, free)]
+    spread = np.broadcast_to(spread, (2, len(about)))
+    free, scale = np.flatnonzero(spread[0] > 0), worth / POINT_NOISE**2
+    smaller, larger = (_precision(each, shared)[np.ix_(free, free)] for each in spread)
     at, damping, best = ((about if first is None else first.to_array()), poses), 1e-2, None
     for turn in range(rounds + 1):
         body = make(type(expected).from_array(at[0]))
@@ -75,13 +77,14 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
         frames = [_equations(model, nudged, pose, cloud, settings, space, emptiness)
                   for pose, cloud, space in zip(at[1], clouds, spaces or [None] * len(clouds), strict=True)]
         off = (at[0] - about)[free]
+        tight = np.where(off[:, None] < 0, smaller, larger)
         cost = scale * (sum(frame.cost for frame in frames) + (pull * (at[1] - start) ** 2).sum()) + off @ tight @ off
         better = best is None or cost < best.cost
         damping *= 0.3 if better else 8
         if best is None or better:
-            best = _Solution(at, cost, frames, tight @ off, body)
+            best = _Solution(at, cost, frames, tight, tight @ off, body)
         if turn < rounds:
-            at = _moved(best, free, tight / scale, scale, start, pull, damping)
+            at = _moved(best, free, scale, start, pull, damping)
     assert best is not None
     residual = np.sqrt(np.mean([frame.squared for frame in best.frames]))
     return Bundle(type(expected).from_array(best.at[0]), best.at[1], float(residual))
@@ -149,6 +152,8 @@ class _Solution(NamedTuple):
     at: tuple[Array, Array]
     cost: float
     frames: list[_Frame]
+    tight: Array
+    """Inverse covariance (K, K) of the free sizes on the side where they are."""
     strain: Array
     body: Body
 
@@ -159,10 +164,9 @@ def _nudged(make: Callable[[Measured], Body], kind: type[Measured], at: Array, f
     return [_model(make(kind.from_array(at + SIZE_STEP * (np.arange(len(at)) == k))), lengths) for k in free]
 
 
-def _moved(best: _Solution, free: NDArray[np.int64], tight: Array, scale: float, start: Array, pull: Array,
-           damping: float) -> tuple[Array, Array]:
+def _moved(best: _Solution, free: NDArray[np.int64], scale: float, start: Array, pull: Array, damping: float) -> tuple[Array, Array]:
     """Sizes and poses after a step: the poses are eliminated (Schur complement), the sizes solved for, the poses substituted back."""
-    D, K = start.shape[1], len(free)
+    D, K, tight = start.shape[1], len(free), best.tight / scale
     total, right, parts = tight + damping * np.diag(np.diag(tight)), -best.strain / scale, []
     for frame, pose, first, held in zip(best.frames, best.at[1], start, pull, strict=True):
         H, g = frame.rows.copy(), frame.gradient.copy()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic
+from typing import Generic, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from shadowpuppet.body.anthropometry import stature_of
 from shadowpuppet.body.models import shares_of
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes, Sizes
+from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
@@ -35,6 +36,10 @@ SIZES_FROM_JOINTS = (
 """Sizes that follow from the joints of training motion."""
 JOINT_DEVIATION = 0.001
 """Their standard deviation (m)."""
+SPINE = ("trunk_height", "lumbar_height", "thorax_height")
+SPINE_DEVIATION = 0.015
+"""Parts of the spine, and the standard deviation (m) by which each may be shorter than in training motion, never longer: the spine bends,
+and the distance between the ends of its parts varies within a take of a dancer by 1.3 cm (sd), and by 9 at most (`cmu_joints`)."""
 ROUNDS = 2
 """Number of rounds; each tracks the first frames, then solves for the sizes."""
 MAX_FRAMES, POINT_STRIDE = 24, 4
@@ -53,8 +58,32 @@ STATURE_DEVIATION, GIRTH_DEVIATION = 0.06, 0.15
 EMPTINESS_SHARE = 0.25
 """Weight of limbs that reach out of the silhouettes while sizes are solved for, over that of the tracker: bones must neither grow into
 empty space nor shrink where a chair hides them."""
+ALIKE = 1.2
+"""Cost of the best pose that faces the other way, over that of a pose, up to which the front is doubted and both are measured."""
+SAME_FRAME = 0.01
+"""Distance (m) of the means of two frames' surface points below which they are taken for the same frame's."""
 MIN_FRAMES = 4
 """Smallest number of frames with a person from which sizes are solved."""
+
+
+class Front(NamedTuple):
+    """The front of a person whose silhouettes hardly distinguish front and back."""
+
+    heading: float
+    """In the first frame in which the person was found, rad."""
+    middle: Array
+    """Mean of that frame's surface points (3,), world."""
+    lead: float
+    """Mean cost of a body that faces the other way, with sizes that suit it, over that of the estimate, less 1."""
+
+    def heading_in(self, surface: SurfacePoints) -> float | None:
+        """The heading, rad, if these are that frame's surface points; None of others."""
+        here = len(surface.points) > 0 and float(np.linalg.norm(surface.points.mean(0) - self.middle)) < SAME_FRAME
+        return self.heading if here else None
+
+
+Found = tuple[int, MultiviewState]
+"""Index of a frame in which the person is found, and the state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +102,18 @@ class SizeEstimate(Generic[Measured]):
     """The last of these frames' pose, of shape (D,)."""
     unexplained: tuple[Unexplained | None, ...] = ()
     """What the silhouettes have beside the body, by camera."""
+    front: Front | None = None
+    """The front, if a body that faces the other way fits nearly as well."""
 
 
 def size_deviations(sizes: BoneSizes, shown: bool) -> Array:
-    """Standard deviations (K,), metres, of the sizes among people; `JOINT_DEVIATION` for bones that joints have `shown`."""
+    """Standard deviations (2, K), metres, of sizes that are smaller and larger than those of people, as in `solve_bundle`;
+    `JOINT_DEVIATION` for bones that joints have `shown`, but the spine may be bent."""
     shares = shares_of(type(sizes))
     stature = stature_of({name: getattr(sizes, name) for name in ("thigh_length", "shank_length", "upper_arm_length", "forearm_length")})
-    return np.array([JOINT_DEVIATION if shown and name in SIZES_FROM_JOINTS else shares[name][1] * stature for name in sizes.names()])
+    larger = [JOINT_DEVIATION if shown and name in SIZES_FROM_JOINTS else shares[name][1] * stature for name in sizes.names()]
+    smaller = [SPINE_DEVIATION if shown and name in SPINE else each for name, each in zip(sizes.names(), larger, strict=True)]
+    return np.array([smaller, larger])
 
 
 def shared_deviations(sizes: BoneSizes) -> Array:
@@ -102,48 +136,91 @@ def _is_width(kind: type[Sizes]) -> NDArray[np.bool_]:
 
 def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], expected: Measured, spread: Array, cameras: Sequence[Camera],
             first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], settings: MultiviewSettings,
-            library: Array | None = None, looks: int = 0, shared: Array | None = None, begin: int = 0) -> SizeEstimate[Measured]:
+            library: Array | None = None, looks: int = 0, shared: Array | None = None, begin: int = 0,
+            both_fronts: bool = True) -> SizeEstimate[Measured]:
     """Sizes of the person in the `first` frames (surface points and masks, in order of time), `expected` with standard deviations `spread`
-    (K,), and `shared` (S, K) as in `solve_bundle`. `looks`: number of frames after which what the body does not explain is left out; 0:
-    never. `begin`: frame in which the person is searched for. Raises `TrackingError` if no person is found."""
-    plain, sizes, residual = replace(settings, method="hybrid", refinement="gauss_newton"), expected, np.nan
-    for _ in range(ROUNDS if (spread > 0).any() else 0):
-        tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
-        found = _followed(rng, tracker, first, begin)
-        if len(found) < MIN_FRAMES:
-            break
-        chosen = evenly_spread(len(found), MAX_FRAMES)
-        poses = np.array([found[i][1].pose for i in chosen])
-        seen = [MultiviewObservation(tracker.views, *first[found[i][0]]) for i in chosen]
-        clouds = [each.cloud(POINT_STRIDE) for each in seen]
-        pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
-        centre, pull = map(np.array, zip(*pulls, strict=True))
-        bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
-                              worth=INDEPENDENT_POINTS[settings.body], shared=shared,
-                              spaces=() if shared is None else [each.space for each in seen],
-                              emptiness=EMPTINESS_SHARE * settings.gauss_newton.emptiness)
-        sizes, residual = bundle.sizes, bundle.residual
-    tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
-    found = _followed(rng, tracker, first, begin)
-    if not found:
+    and `shared` as in `solve_bundle`. `looks`: number of frames after which what the body does not explain is left out; 0:
+    never. `begin`: frame in which the person is searched for. Raises `TrackingError` if no person is found.
+
+    Silhouettes of a person who stands upright hardly distinguish front and back. With `both_fronts`, where a body that faces the other way
+    fits nearly as well, the person is measured facing that way, too, and what fits better is kept.
+    """
+    plain = replace(settings, method="hybrid", refinement="gauss_newton")
+
+    def tracker_of(sizes: Measured) -> MultiviewTracker:
+        return MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
+
+    def measured(rng: np.random.Generator, facing: float | None = None) -> tuple[SizeEstimate[Measured], list[Found]] | None:
+        sizes, residual = expected, np.nan
+        for _ in range(ROUNDS if (spread > 0).any() else 0):
+            tracker = tracker_of(sizes)
+            found = _followed(rng, tracker, first, begin, facing)
+            if len(found) < MIN_FRAMES:
+                break
+            chosen = evenly_spread(len(found), MAX_FRAMES)
+            poses = np.array([found[i][1].pose for i in chosen])
+            seen = [MultiviewObservation(tracker.views, *first[found[i][0]]) for i in chosen]
+            clouds = [each.cloud(POINT_STRIDE) for each in seen]
+            pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
+            centre, pull = map(np.array, zip(*pulls, strict=True))
+            bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
+                                  worth=INDEPENDENT_POINTS[settings.body], shared=shared,
+                                  spaces=() if shared is None else [each.space for each in seen],
+                                  emptiness=EMPTINESS_SHARE * settings.gauss_newton.emptiness)
+            sizes, residual = bundle.sizes, bundle.residual
+        tracker = tracker_of(sizes)
+        found = _followed(rng, tracker, first, begin, facing)
+        if not found:
+            return None
+        last = found[-1][1]
+        return SizeEstimate(sizes, tracker.body, residual, float(np.mean([state.overlap for _, state in found])), len(found), last.pose,
+                            last.unexplained), found
+
+    best = measured(rng)
+    if best is None:
         raise TrackingError(f"nobody is found in the first {len(first)} frames' silhouettes: are they a whole person's, in two cameras or "
                             "more at once, and do the cameras agree? `shadowpuppet info` tells")
-    return SizeEstimate(sizes, tracker.body, residual, float(np.mean([state.overlap for _, state in found])), len(found),
-                        found[-1][1].pose, found[-1][1].unexplained)
+    other = rng.spawn(1)[0]  # the numbers drawn afterwards do not depend on whether a front is tried
+    about = min(best[1], key=lambda each: abs(each[0] - begin))
+    facing = _other_front(other, tracker_of(best[0].sizes), first, *about) if both_fronts else None
+    turned = None if facing is None else measured(other, facing)
+    if turned is None:
+        return best[0]
+    costs = [float(np.mean([state.cost for _, state in found])) for _, found in (best, turned)]
+    estimate, found = best if costs[0] <= costs[1] else turned
+    index, state = found[0]
+    middle = first[index][0].points.mean(0)
+    return replace(estimate, front=Front(heading_of(estimate.body, state.pose), middle, max(costs) / min(costs) - 1))
+
+
+def _other_front(rng: np.random.Generator, tracker: MultiviewTracker, first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]],
+                 index: int, state: MultiviewState) -> float | None:
+    """The opposite heading (rad) of a state found in frame `index`, if a body that faces that way fits the frame nearly as well; None if it
+    does not."""
+    facing = heading_of(tracker.body, state.pose) + np.pi
+    turned = tracker.start(rng, *first[index], facing=facing)
+    is_turned = np.cos(heading_of(tracker.body, turned.pose) - facing) > 0  # otherwise it has turned back while it was fitted
+    return facing if is_turned and turned.cost <= ALIKE * state.cost else None
+
+
+def heading_of(body: Body, pose: Array) -> float:
+    """Heading (rad) of a pose (D,)."""
+    return float(pose[body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]])
 
 
 def _followed(rng: np.random.Generator, tracker: MultiviewTracker,
-              first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], begin: int) -> list[tuple[int, MultiviewState]]:
-    """Indices and states of the frames in which the person is found: searched for in the frame `begin`, followed from there back to the
-    first one and then through all, and searched for again if the overlap falls."""
-    state, found, best = None, list[tuple[int, MultiviewState]](), 0.0
+              first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], begin: int, facing: float | None) -> list[Found]:
+    """The frames in which the person is found: searched for in the frame `begin`, as facing a heading (rad) or any way, followed from there
+    back to the first one and then through all, and searched for again if the overlap falls."""
+    state, found, best = None, list[Found](), 0.0
     for points, masks in first[begin:0:-1]:
-        state = tracker.start(rng, points, masks) if state is None else tracker.step(rng, state, points, masks)
+        state = tracker.start(rng, points, masks, facing=facing) if state is None else tracker.step(rng, state, points, masks)
     state = None if state is None else state._replace(velocity=np.zeros_like(state.velocity), unexplained=())
     for n, (points, masks) in enumerate(first):
-        state = tracker.start(rng, points, masks) if state is None else tracker.step(rng, state, points, masks)
+        state = tracker.start(rng, points, masks, facing=facing) if state is None else tracker.step(rng, state, points, masks)
         if state.overlap < best - OVERLAP_LOSS and state.status != "absent":
-            again = tracker.start(rng, points, masks)._replace(unexplained=state.unexplained)
+            facing = None if facing is None else heading_of(tracker.body, state.pose)
+            again = tracker.start(rng, points, masks, facing=facing)._replace(unexplained=state.unexplained)
             state = min(state, again, key=lambda each: each.cost)
         best = max(best, state.overlap)
         if state.status in ("tracked", "uncertain"):

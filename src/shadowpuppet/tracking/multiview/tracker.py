@@ -130,11 +130,11 @@ class MultiviewTracker:
             cycle=lambda state: self.cycle(rng, state, observation), search=lambda: self.search(rng, observation))  # fmt: skip
 
     def start(self, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None],
-              also: Cost | None = None) -> MultiviewState:
-        """A state from one frame's points and masks (H, W), as `search` finds it, or `absent`. Arguments as in `step`."""
+              also: Cost | None = None, facing: float | None = None) -> MultiviewState:
+        """A state from one frame's points and masks (H, W), as `search` finds it, or `absent`. Arguments as in `step` and `search`."""
         observation = MultiviewObservation(self.views, points, masks, also)
         if self.is_present(observation):
-            return self.search(rng, observation)
+            return self.search(rng, observation, facing)
         rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))
         return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent")
 
