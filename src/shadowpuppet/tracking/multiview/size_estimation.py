@@ -143,7 +143,7 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
     never. `begin`: frame in which the person is searched for. Raises `TrackingError` if no person is found.
 
     Silhouettes of a person who stands upright hardly distinguish front and back. With `both_fronts`, where a body that faces the other way
-    fits nearly as well, the person is measured facing that way, too, and what fits better is kept.
+    fits nearly as well, the person is measured facing that way, too, and what fits better is kept; not with cylinders, which have no front.
     """
     plain = replace(settings, method="hybrid", refinement="gauss_newton")
 
@@ -182,7 +182,7 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
                             "more at once, and do the cameras agree? `shadowpuppet info` tells")
     other = rng.spawn(1)[0]  # the numbers drawn afterwards do not depend on whether a front is tried
     about = min(best[1], key=lambda each: abs(each[0] - begin))
-    facing = _other_front(other, tracker_of(best[0].sizes), first, *about) if both_fronts else None
+    facing = _other_front(other, tracker_of(best[0].sizes), first, *about) if both_fronts and settings.body != "cylinders" else None
     turned = None if facing is None else measured(other, facing)
     if turned is None:
         return best[0]
