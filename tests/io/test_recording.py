@@ -286,6 +286,19 @@ def test_what_is_no_recording_is_said(tmp_path, one):
 
 
 @pytest.mark.shared
+def test_a_run_is_no_recording(one):
+    """With and without its overlay, also where its calibration lies; a recording that was tracked into its own folder is still one."""
+    (one.parent / "run").mkdir()
+    write_calibration(one.parent / "run" / "calibration.toml", cameras("cam"))
+    (one.parent / "run" / "run.toml").write_text("complete = true\n")
+    for _ in range(2):
+        with pytest.raises(RecordingError, match=r"run: found a run, .*, expected a recording; `shadowpuppet view`, .* run/run\.toml"):
+            read_recording(one.parent / "run")
+        film(one.parent / "run" / "overlay.mp4")
+    (one / "run.toml").write_text("complete = true\n")
+    assert read_recording(one).views
+
+
 def test_shared_recordings_are_read(shared):
     folders = sorted(p.parent for p in shared.glob("re*/*/calibration.toml"))
     assert folders

@@ -105,6 +105,10 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
     if camera_number(path) is None and not exists and project is None:
         raise RecordingError(f"{folder}: no such recording, expected a folder with video/ and calibration.toml, or a film"
                              f"{_like(folder)}")
+    if is_run(folder):
+        raise RecordingError(f"{folder}: found a run, as `shadowpuppet track` writes it, expected a recording; `shadowpuppet view`, "
+                             f"`evaluate`, `export` and `report` read runs; `track` reads the recording that was tracked, named in {folder}"
+                             "/run.toml")
     if project is not None or (folder.is_dir() and (_is_own(folder) or films_in(folder))):
         return _read_folder(project.folder if project else folder, fov, calibration, project, asked)
     if folder.is_dir() and not any(p.suffix.lower() in IMAGE_SUFFIXES for p in folder.iterdir()):
@@ -136,6 +140,12 @@ def _like(path: Path) -> str:
 def _is_own(folder: Path) -> bool:
     """Whether a folder is laid out as a recording."""
     return any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml"))
+
+
+def is_run(folder: Path) -> bool:
+    """Whether a folder holds a run, and no film but the run's overlay."""
+    noted = any((folder / name).exists() for name in ("video", "recording.toml"))
+    return (folder / "run.toml").is_file() and not noted and set(films_in(folder)) <= {"overlay"}
 
 
 def is_recording(folder: Path) -> bool:

@@ -27,10 +27,10 @@ LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 def is_explained(path: Path) -> bool:
     """Whether `path` is a calibration, not a recording."""
     from shadowpuppet.io.calibration.formats import find_calibration, is_calibration
-    from shadowpuppet.io.recording import is_recording
+    from shadowpuppet.io.recording import is_recording, is_run
 
     if path.is_dir():
-        return not is_recording(path) and (is_calibration(path) or find_calibration(path) is not None)
+        return not (is_recording(path) or is_run(path)) and (is_calibration(path) or find_calibration(path) is not None)
     return path.is_file() and is_calibration(path)
 
 
