@@ -58,11 +58,11 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
                  spaces: Sequence[FreeSpace] = (), emptiness: float = 0.0) -> Bundle[Measured]:
     """Sizes and poses that fit the surface points of F frames, by damped Gauss-Newton from poses (F, D) and sizes `first` or `expected`.
 
-    `spread` (K,): standard deviations (m) of the expected sizes, 0 for fixed ones; (2, K) of what is smaller and what is larger than
-    expected. `shared` (S, K): deviations that sizes have together,
-    each row for one standard deviation of a common cause, such as the stature. `spaces`, one per frame, and `emptiness`: silhouettes that
-    limbs must not reach out of, as in `Pass`. `pull`, one or (F, D): weight of the squared distance from `centre` (F, D; default: `poses`),
-    as in `Refiner.gauss_newton`. `worth`: effective number of independent points per frame.
+    `spread`: standard deviations (m) of the expected sizes, (K,), or (2, K) for sizes that are smaller and larger than expected; 0 for
+    fixed ones. `shared` (S, K): deviations that sizes have together, each row for one standard deviation of a common cause, such as the
+    stature. `spaces`, one per frame, and `emptiness`: silhouettes that limbs must not reach out of, as in `Pass`. `pull`, one or (F, D):
+    weight of the squared distance from `centre` (F, D; default: `poses`), as in `Refiner.gauss_newton`. `worth`: effective number of
+    independent points per frame.
     """
     settings, start, about = settings or SurfaceSettings(), poses if centre is None else centre, expected.to_array()
     pull = np.broadcast_to(pull, poses.shape)

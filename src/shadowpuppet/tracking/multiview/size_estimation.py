@@ -107,8 +107,8 @@ class SizeEstimate(Generic[Measured]):
 
 
 def size_deviations(sizes: BoneSizes, shown: bool) -> Array:
-    """Standard deviations (2, K), metres, of sizes that are smaller and larger than those of people, as in `solve_bundle`;
-    `JOINT_DEVIATION` for bones that joints have `shown`, but the spine may be bent."""
+    """Standard deviations (2, K), metres, of sizes that are smaller and larger than expected, as people's differ; `JOINT_DEVIATION` for
+    bones that joints have `shown`, but a bent spine is shorter."""
     shares = shares_of(type(sizes))
     stature = stature_of({name: getattr(sizes, name) for name in ("thigh_length", "shank_length", "upper_arm_length", "forearm_length")})
     larger = [JOINT_DEVIATION if shown and name in SIZES_FROM_JOINTS else shares[name][1] * stature for name in sizes.names()]
@@ -139,8 +139,8 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
             library: Array | None = None, looks: int = 0, shared: Array | None = None, begin: int = 0,
             both_fronts: bool = True) -> SizeEstimate[Measured]:
     """Sizes of the person in the `first` frames (surface points and masks, in order of time), `expected` with standard deviations `spread`
-    and `shared` as in `solve_bundle`. `looks`: number of frames after which what the body does not explain is left out; 0:
-    never. `begin`: frame in which the person is searched for. Raises `TrackingError` if no person is found.
+    and `shared` as in `solve_bundle`. `looks`: number of frames after which what the body does not explain is left out; 0: never. `begin`:
+    frame in which the person is searched for. Raises `TrackingError` if no person is found.
 
     Silhouettes of a person who stands upright hardly distinguish front and back. With `both_fronts`, where a body that faces the other way
     fits nearly as well, the person is measured facing that way, too, and what fits better is kept; not with cylinders, which have no front.
