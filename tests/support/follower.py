@@ -31,7 +31,7 @@ class Follower:
         self.body, self.cameras, self.calls = body, tuple(cameras), []
         self.views = BodyInViews(body, ())  # an upright body is no measure of whether cameras are in step
 
-    def start(self, rng, points, masks) -> Standing:
+    def start(self, rng, points, masks, facing=None) -> Standing:
         self.calls.append("start")
         return self._there(rng, points, masks)
 
