@@ -139,19 +139,22 @@ def _like(path: Path) -> str:
 
 def _is_own(folder: Path) -> bool:
     """Whether a folder is laid out as a recording."""
-    return any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml"))
+    return _is_noted(folder) or (folder / "calibration.toml").exists()
+
+
+def _is_noted(folder: Path) -> bool:
+    """Whether a folder says itself that it is a recording, by its films' place or its notes."""
+    return any((folder / name).exists() for name in ("video", "recording.toml"))
 
 
 def is_run(folder: Path) -> bool:
     """Whether a folder holds a run, and no film but the run's overlay."""
-    noted = any((folder / name).exists() for name in ("video", "recording.toml"))
-    return (folder / "run.toml").is_file() and not noted and set(films_in(folder)) <= {"overlay"}
+    return (folder / "run.toml").is_file() and not _is_noted(folder) and set(films_in(folder)) <= {"overlay"}
 
 
 def is_recording(folder: Path) -> bool:
     """Whether a folder holds films with what is known about them, so that it is more than a calibration."""
-    noted = any((folder / name).exists() for name in ("video", "recording.toml"))
-    return noted or find_project(folder) is not None or bool(films_in(folder))
+    return _is_noted(folder) or find_project(folder) is not None or bool(films_in(folder))
 
 
 def _read_folder(folder: Path, fov: float | None, calibration: Path | None, project: Project | None,

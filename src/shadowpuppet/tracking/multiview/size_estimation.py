@@ -147,14 +147,15 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
     """
     plain = replace(settings, method="hybrid", refinement="gauss_newton")
 
-    def tracker_of(sizes: Measured) -> MultiviewTracker:
-        return MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
+    def followed(rng: np.random.Generator, sizes: Measured, facing: float | None) -> tuple[MultiviewTracker, list[Found]]:
+        tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
+        return tracker, _followed(rng, tracker, first, begin, facing)
 
-    def measured(rng: np.random.Generator, facing: float | None = None) -> tuple[SizeEstimate[Measured], list[Found]] | None:
+    def measured(rng: np.random.Generator,
+                 facing: float | None = None) -> tuple[SizeEstimate[Measured], MultiviewTracker, list[Found]] | None:
         sizes, residual = expected, np.nan
         for _ in range(ROUNDS if (spread > 0).any() else 0):
-            tracker = tracker_of(sizes)
-            found = _followed(rng, tracker, first, begin, facing)
+            tracker, found = followed(rng, sizes, facing)
             if len(found) < MIN_FRAMES:
                 break
             chosen = evenly_spread(len(found), MAX_FRAMES)
@@ -168,26 +169,26 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
                                   spaces=() if shared is None else [each.space for each in seen],
                                   emptiness=EMPTINESS_SHARE * settings.gauss_newton.emptiness)
             sizes, residual = bundle.sizes, bundle.residual
-        tracker = tracker_of(sizes)
-        found = _followed(rng, tracker, first, begin, facing)
+        tracker, found = followed(rng, sizes, facing)
         if not found:
             return None
         last = found[-1][1]
         return SizeEstimate(sizes, tracker.body, residual, float(np.mean([state.overlap for _, state in found])), len(found), last.pose,
-                            last.unexplained), found
+                            last.unexplained), tracker, found
 
     best = measured(rng)
     if best is None:
         raise TrackingError(f"nobody is found in the first {len(first)} frames' silhouettes: are they a whole person's, in two cameras or "
                             "more at once, and do the cameras agree? `shadowpuppet info` tells")
     other = rng.spawn(1)[0]  # the numbers drawn afterwards do not depend on whether a front is tried
-    about = min(best[1], key=lambda each: abs(each[0] - begin))
-    facing = _other_front(other, tracker_of(best[0].sizes), first, *about) if both_fronts and settings.body != "cylinders" else None
+    estimate, tracker, found = best
+    about = min(found, key=lambda each: abs(each[0] - begin))
+    facing = _other_front(other, tracker, first, *about) if both_fronts and settings.body != "cylinders" else None
     turned = None if facing is None else measured(other, facing)
     if turned is None:
-        return best[0]
-    costs = [float(np.mean([state.cost for _, state in found])) for _, found in (best, turned)]
-    estimate, found = best if costs[0] <= costs[1] else turned
+        return estimate
+    costs = [float(np.mean([state.cost for _, state in frames])) for *_, frames in (best, turned)]
+    estimate, _, found = best if costs[0] <= costs[1] else turned
     index, state = found[0]
     middle = first[index][0].points.mean(0)
     return replace(estimate, front=Front(heading_of(estimate.body, state.pose), middle, max(costs) / min(costs) - 1))
