@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from shadowpuppet.body.upper_body import WRIST_SHARE
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import Codes, colour_codes
 from shadowpuppet.camera.mask import Mask
@@ -70,6 +71,17 @@ class Case:
     def person(self, options: Options, rng: np.random.Generator) -> PersonEstimate:
         """Sizes and place, as `shadowpuppet track` finds them."""
         return fit_monocular(rng, self.survey, options).fit.guess
+
+    def with_true_arms(self, person: PersonEstimate) -> PersonEstimate:
+        """An upper body's estimate with the truth's lengths of upper arms and forearms; hands in proportion."""
+        table = self.truth
+
+        def length(upper: str, lower: str) -> float:
+            ends = (table.select([f"{side}_{joint}" for side in ("left", "right")]).positions for joint in (upper, lower))
+            return float(np.nanmedian(np.linalg.norm(np.subtract(*ends), axis=2)))
+
+        arms = {"upper_arm_length": length("shoulder", "elbow"), "forearm_length": length("elbow", "wrist") / WRIST_SHARE}
+        return replace(person, sizes=replace(person.sizes, **arms))
 
     def track(self, person: PersonEstimate, settings: MonocularSettings, rng: np.random.Generator) -> dict[str, float]:
         """Run a tracker, both ways if the settings say so, and measure it: millimetres, percent, pixels, m/s^2 and milliseconds a

@@ -39,6 +39,7 @@ def _particles(number: int, cycles: int, explore: int) -> dict[str, Any]:
 TRADE: dict[str, dict[str, Any]] = {f"N {n}, {k} cycle{'s' * (k > 1)}": _particles(n, k, n) for n in (25, 50, 100, 200, 400, 800)
                                     for k in (1, 2, 3, 5)}
 """Particles and cycles: what time buys."""
+TRUE_ARMS = "true arms"
 ROWS: dict[str, dict[str, Any]] = {
     "default": {},
     "liu2011": {"preset": "liu2011"},
@@ -46,6 +47,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "exact masks": {"masks": True},
     "cardbox": {"tracker": {"body": "cardbox"}},
     "no colours of arms": {"tracker": {"arm_colours": False}},
+    "true arms": {TRUE_ARMS: True},
     "forward only": {"tracker": {"both_ways": False}},
     "no exploring": {"tracker": {"explore": 0}},
     "explore 2000": {"tracker": {"explore": 2000}},
@@ -60,7 +62,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "flat": {"tracker": {"stages": ["torso+left_arm+right_arm"]}},
     **TRADE,
 }
-"""Each a default with something changed."""
+"""Each a default with something changed; `TRUE_ARMS` is no option: sizes with the truth's lengths of the arms."""
 
 
 def made(folder: Path, names: Iterable[str] = (), shift: int = 0) -> list[Path]:
@@ -90,9 +92,11 @@ def run(path: Path, rows: Mapping[str, Mapping[str, Any]], seeds: int) -> dict[s
     """Measures of one recording: row to seeds."""
     out = {}
     for name, values in rows.items():
-        options = make_options(dict(values))
-        out[name] = [_case(path, options.masks).track(_person(path, options.masks, options.tracker.body, seed), options.tracker,
-                                                      np.random.default_rng([seed, 1])) for seed in range(seeds)]
+        options = make_options({key: value for key, value in values.items() if key != TRUE_ARMS})
+        case, persons = _case(path, options.masks), [_person(path, options.masks, options.tracker.body, seed) for seed in range(seeds)]
+        if values.get(TRUE_ARMS):
+            persons = [case.with_true_arms(person) for person in persons]
+        out[name] = [case.track(person, options.tracker, np.random.default_rng([seed, 1])) for seed, person in enumerate(persons)]
     return out
 
 
@@ -156,7 +160,7 @@ def draw(found: Mapping[str, Mapping[str, list[dict[str, float]]]], file: Path) 
 
 def _smallest(folder: Path) -> list[object]:
     smallest.make(folder / "man_paper")
-    return ["--rows", "liu2011;no exploring", "--recordings", "man_paper", "--seeds", 1, "--folder", folder, "--each",
+    return ["--rows", "liu2011;no exploring;true arms", "--recordings", "man_paper", "--seeds", 1, "--folder", folder, "--each",
             "--markdown", folder / "table.md", "--json", folder / "measures.json"]
 
 

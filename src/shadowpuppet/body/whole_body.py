@@ -20,6 +20,13 @@ Three = tuple[float, float, float]
 FREE = (-np.inf, np.inf)
 GLOBAL_DOFS = ("root_x", "root_y", "root_z", "root_heading")
 """Degrees of freedom for position and heading in the world, which no articulation prior models."""
+
+
+def heading_column(skeleton: Skeleton) -> int:
+    """Index of the heading among a whole body's DOF."""
+    return int(skeleton.dof_indices(GLOBAL_DOFS[3:])[0])
+
+
 SWING = {"left": ("-y", "x", "z"), "right": ("-y", "-x", "-z")}
 """Axes about which a hanging limb swings forward, outward, and twists outward."""
 

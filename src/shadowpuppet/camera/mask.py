@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ NEARLY_ALL = 0.8
 """Share of the picture above which a silhouette is implausible."""
 Window = tuple[slice, slice]
 """Rows and columns of a picture."""
+Value = TypeVar("Value", bound=np.generic)
 
 
 class Seen(NamedTuple):
@@ -45,6 +46,11 @@ def bounding_window(mask: Mask | NDArray[np.uint8], margin: int) -> Window:
 
     x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
     return slice(max(y - margin, 0), y + height + margin), slice(max(x - margin, 0), x + width + margin)
+
+
+def half_size(pixels: NDArray[Value]) -> NDArray[Value]:
+    """A copy of every second pixel of every second row of a mask or picture (H, W, ...)."""
+    return np.array(pixels[::2, ::2], order="C")
 
 
 def grown(mask: Mask, by: int) -> Mask:

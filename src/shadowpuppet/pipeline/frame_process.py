@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.colour_codes import colour_codes
+from shadowpuppet.camera.mask import half_size
 from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.pipeline.rig import FrameSet, Rig, read_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes
@@ -66,7 +67,7 @@ class Task:
                 begin = time.perf_counter()
                 points = None if self.hull is None else self.hull.points(seen.masks)
                 images = seen.images if self.images else (None,) * len(seen.images)
-                corrected = tuple(None if each is None else each[::2, ::2].copy() for each in seen.corrected) if self.corrected else ()
+                corrected = tuple(None if each is None else half_size(each) for each in seen.corrected) if self.corrected else ()
                 codes = tuple(map(colour_codes, seen.corrected)) if self.codes and seen.corrected else seen.codes
                 yield seen._replace(images=images, corrected=corrected, codes=codes, points=points, carving=time.perf_counter() - begin)
 

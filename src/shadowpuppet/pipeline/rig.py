@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import Codes, colour_codes
-from shadowpuppet.camera.mask import Mask, Seen
+from shadowpuppet.camera.mask import Mask, Seen, half_size
 from shadowpuppet.errors import SettingsError, SilhouetteError, VideoError, warn
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage, chosen_views, open_recording
@@ -48,7 +48,7 @@ def unshared(found: Sequence[Segmented | None]) -> tuple[Mask | None, ...]:
 
 def shown_in(found: Sequence[Segmented | None], share: Share = unshared) -> Seen:
     """What the silhouettes of a set's cameras show, with those masks that `share` makes of them."""
-    return Seen(share(found), tuple(None if each is None or each.shadow is None else each.shadow[::2, ::2].copy() for each in found))
+    return Seen(share(found), tuple(None if each is None or each.shadow is None else half_size(each.shadow) for each in found))
 
 
 class FrameSet(NamedTuple):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.sizes import BoneSizes
-from shadowpuppet.body.whole_body import GLOBAL_DOFS
+from shadowpuppet.body.whole_body import heading_column
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion.motion import BLANK, PER_FRAME, Motion, MotionBuilder, MotionFrame
@@ -205,7 +205,7 @@ def _lead(member: Member, share: Share, motion: Motion, time: float) -> float:
         return AS_WELL
     observation = observed(member.subject.tracker, share)
     mine, theirs = (float(np.nan_to_num(observation.overlap(pose))) for pose in (share.state.pose, motion.poses[at]))
-    heading = member.subject.body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
+    heading = heading_column(member.subject.body.skeleton)
     turned = np.cos(share.state.pose[heading] - motion.poses[at, heading]) < np.cos(TURN)
     return mine - theirs + (TURNED if turned else AS_WELL)
 

@@ -11,7 +11,7 @@ import numpy as np
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.bits import Bits, is_set, pack
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.mask import Mask, half_size, may_be_person
 from shadowpuppet.camera.projection import make_lens, pixel_nearest
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
@@ -134,11 +134,6 @@ class MultiviewObservation:
         """Intersection over union of a drawn pose (D,) and the silhouettes, mean of all pictures; 0 without silhouettes."""
         overlaps = self.overlaps(pose)[list(self.seen)]
         return float(np.mean(overlaps)) if len(overlaps) else 0.0
-
-
-def half_size(mask: Mask) -> Mask:
-    """Every second pixel of every second row of a mask (H, W)."""
-    return np.ascontiguousarray(mask[::2, ::2])
 
 
 def _without(surface: SurfacePoints, views: BodyInViews, left_out: Sequence[Bits | None]) -> SurfacePoints:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.whole_body import GLOBAL_DOFS
+from shadowpuppet.body.whole_body import GLOBAL_DOFS, heading_column
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms, usual_postures
@@ -53,8 +53,7 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
     poses = place_postures(body, postures, observation.full.origin)
     poses = np.concatenate([poses, stood(body, poses, _lowest(observation.surface.points))])
     if facing is not None:
-        heading = body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
-        poses = poses[np.cos(poses[:, heading] - facing) > 1e-6]
+        poses = poses[np.cos(poses[:, heading_column(body.skeleton)] - facing) > 1e-6]
     share, _, tau = COARSE_STAGES[0]
     poses = poses[refiner.costs(poses, observation.cloud(share), tau).argsort(kind="stable")[:COARSE_CANDIDATES]]
     poses = best_of((evaluate(_refined(refiner, observation, poses, COARSE_STAGES), weigh),), FINE_CANDIDATES).poses
@@ -83,7 +82,7 @@ def _other_arms(rng: np.random.Generator, body: Body, pose: Array, side: str) ->
 def place_postures(body: Body, postures: Array, middle: Array) -> Array:
     """Postures (L, D) in all headings, with the limbs' centre at `middle` (3,), world; of shape (L HEADINGS, D)."""
     poses = np.repeat(postures, HEADINGS, axis=0)
-    place, heading = body.skeleton.dof_indices(GLOBAL_DOFS[:3]), body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
+    place, heading = body.skeleton.dof_indices(GLOBAL_DOFS[:3]), heading_column(body.skeleton)
     poses[:, place] = 0.0
     poses[:, heading] = np.tile(np.arange(HEADINGS) * 2 * np.pi / HEADINGS - np.pi, len(postures))
     limbs = body.limbs

@@ -17,7 +17,7 @@ from shadowpuppet.body.anthropometry import stature_of
 from shadowpuppet.body.models import shares_of
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes, Sizes
-from shadowpuppet.body.whole_body import GLOBAL_DOFS
+from shadowpuppet.body.whole_body import heading_column
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
@@ -206,7 +206,7 @@ def _other_front(rng: np.random.Generator, tracker: MultiviewTracker, first: Seq
 
 def heading_of(body: Body, pose: Array) -> float:
     """Heading (rad) of a pose (D,)."""
-    return float(pose[body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]])
+    return float(pose[heading_column(body.skeleton)])
 
 
 def _followed(rng: np.random.Generator, tracker: MultiviewTracker,

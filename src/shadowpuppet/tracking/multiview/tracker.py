@@ -14,13 +14,13 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.bits import pack
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import Codes
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, half_size
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview import arm_postures, body_postures, pose_search
 from shadowpuppet.tracking.multiview.arms_in_views import ArmsInViews, Counts
 from shadowpuppet.tracking.multiview.local_search import LocalSearch
-from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, half_size
+from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation
 from shadowpuppet.tracking.multiview.posture_prior import PosturePrior
 from shadowpuppet.tracking.multiview.proposals import Proposals
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refine, Refiner

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Limbs
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, half_size
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.multiview.observation import half_size
 from shadowpuppet.tracking.multiview.refinement.free_space import spheres_in
 from shadowpuppet.tracking.people.floor import figure_points
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask, Seen, may_be_person
+from shadowpuppet.camera.mask import Mask, Seen, half_size, may_be_person
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
 from shadowpuppet.threads import usable_cores
@@ -162,7 +162,7 @@ def drawn(floor: Floor, figure: Figure, wide: float = WIDE) -> list[Mask]:
 
 def _states(seen: Seen, explained: Sequence[Mask | None]) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
     """What each pixel is, (C, pixels), and the cameras that say something; arguments as for `find_people`."""
-    halves = [None if mask is None else solid(mask[::2, ::2]) for mask in telling(seen.masks)]
+    halves = [None if mask is None else solid(half_size(mask)) for mask in telling(seen.masks)]
     state = np.zeros((len(halves), max((half.size for half in halves if half is not None), default=0)), np.uint8)
     for n, half in enumerate(halves):
         if half is not None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import other_side
-from shadowpuppet.body.whole_body import GLOBAL_DOFS
+from shadowpuppet.body.whole_body import GLOBAL_DOFS, heading_column
 from shadowpuppet.camera.bits import Bits, count
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
@@ -166,7 +166,7 @@ def shows_side(person: MultiviewTracker, share: Share) -> bool:
 def keep_front(person: MultiviewTracker, rng: np.random.Generator, before: MultiviewState, share: Share) -> Share:
     """The share of a person whose front was known in the state `before`, of the frame beside: facing that way, unless the body turned round
     fits clearly better."""
-    heading = person.body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0]
+    heading = heading_column(person.body.skeleton)
     if share.state.status == "lost" or np.cos(share.state.pose[heading] - before.pose[heading]) > np.cos(TURN):
         return share
     turned = turn_round(person, rng, share)
@@ -184,7 +184,7 @@ def _facing_the_other_way(person: MultiviewTracker, rng: np.random.Generator, st
                           observation: PersonObservation) -> MultiviewState:
     """The state of the body facing the other way: of the same pose turned round, or searched for, whichever fits better; lost if both come
     round again."""
-    heading, seed = person.body.skeleton.dof_indices(GLOBAL_DOFS[3:])[0], int(rng.integers(2**63))  # one generator for each thread
+    heading, seed = heading_column(person.body.skeleton), int(rng.integers(2**63))  # one generator for each thread
     with ThreadPoolExecutor(min(2, usable_cores()), "other way") as pool:
         search = pool.submit(person.search, np.random.default_rng(seed), observation, float(state.pose[heading]) + np.pi)
         turned = settle(_turned_round(person, state), lambda other: person.cycle(rng, other, observation))
@@ -197,7 +197,7 @@ def _turned_round(person: MultiviewTracker, state: MultiviewState) -> MultiviewS
     """A state with the body turned to face the other way; the arms and legs of one side are those of the other."""
     skeleton = person.body.skeleton
     pose = state.pose[other_side(skeleton.dof_names)]
-    pose[skeleton.dof_indices(GLOBAL_DOFS[3:])[0]] += np.pi
+    pose[heading_column(skeleton)] += np.pi
     return at_pose(person, state, pose)
 
 

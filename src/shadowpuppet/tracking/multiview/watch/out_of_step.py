@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.camera.bits import Bits, count, pack
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, half_size
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.frozen import LEAST, SetAside
-from shadowpuppet.tracking.multiview.observation import half_size
 
 LAGS = (0.07, 0.13, 0.2, 0.3, 0.4)
 """Times (s) by which a camera may be late, or early."""
