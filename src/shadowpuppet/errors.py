@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import errno
+import os
 import shlex
 import stat
 import sys
 import warnings
 from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
 
 NOTED, HARMFUL, RUINOUS = 1, 2, 3
@@ -99,6 +101,17 @@ def choices(names: Iterable[str]) -> str:
     return ", ".join(sorted(names)) or "none"
 
 
+def did_you_mean(name: object, known: Iterable[str]) -> str:
+    """The one of the `known` names that is nearly `name`, as the end of a message; empty if none is."""
+    found = get_close_matches(str(name), list(known), 1)
+    return f"; did you mean {found[0]}?" if found else ""
+
+
+def typed(*words: object) -> str:
+    """A command of this program as it is typed here: words with blanks are quoted."""
+    return f"{os.environ.get('SHADOWPUPPET_COMMAND', 'shadowpuppet')} {shlex.join(map(str, words))}"
+
+
 def extra_command(extra: str) -> str:
     """The command that installs an extra of this package where it runs: a plain pip may be another environment's."""
     from shutil import which
@@ -134,9 +147,13 @@ class ShadowPuppetWarning(UserWarning):
         return one_line(super().__str__())
 
 
+WRAPPERS = ("contextlib", "numpy")
+"""Packages whose decorators lie between the caller's code and ours."""
+
+
 def warn(message: str) -> None:
     """Warn of a problem that does not stop the work. The warning names the line that led to it in the caller's own code, not here."""
     frame, level = sys._getframe(1), 2
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == __name__.partition(".")[0]:
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in (__name__.partition(".")[0], *WRAPPERS):
         frame, level = frame.f_back, level + 1
     warnings.warn(message, ShadowPuppetWarning, stacklevel=level)

@@ -67,6 +67,12 @@ def test_a_row_a_camera(printed):
                                                                 "b given 930.3 not known"]
 
 
+def test_nothing_is_cut_off_in_a_file(printed, monkeypatch):
+    wide = printed(result_table(session()))
+    monkeypatch.setenv("COLUMNS", "40")
+    assert printed(result_table(session())) == wide
+
+
 def cells(html: str) -> list[list[str]]:
     return [re.findall(r"<t[hd]>(.*?)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", html)]
 

@@ -10,8 +10,9 @@ import pytest
 from shadowpuppet.cli import batch_terminal
 from shadowpuppet.cli.batch_terminal import LINES, BatchTerminal, _clock, _pace
 from shadowpuppet.cli.look_tables import _camera_table, _film, _quality, _rig_person, _rig_table
-from shadowpuppet.cli.tables import error_table, files_in, metrics_table, people_table, show_next, typed, verdict_table
+from shadowpuppet.cli.tables import error_table, files_in, metrics_table, people_table, show_next, verdict_of, verdict_table
 from shadowpuppet.cli.terminal import Terminal
+from shadowpuppet.errors import typed
 
 QUALITY = SimpleNamespace(frames=12, area=0.0512, area_change=0.0123, flicker=0.0045, specks=0.25, holes=1.5,
                           border={"left": 0.021, "right": 0.02, "bottom": 0.5})  # fmt: skip
@@ -118,6 +119,7 @@ def test_verdicts(printed):
     assert verdict("bad", "it is dark") == ["verdict bad", "because it is dark"]
     assert verdict("good") == ["verdict good"]
     assert printed(verdict_table(SimpleNamespace(word="bad", reasons=("dark",)), "on the run")) == ["on the run bad", "because dark"]
+    assert printed(verdict_of({"word": "bad", "reasons": ["dark"], "more": 1}, "person 1")) == ["person 1 bad", "because dark"]
 
 
 def test_files_that_are_there_are_named(tmp_path):

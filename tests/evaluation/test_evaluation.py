@@ -253,6 +253,22 @@ def test_another_world_is_said_not_scored_in_silence(shell, folder, tmp_path):
     assert moved_there["errors"]["mean_mm"] == pytest.approx(plain["aligned_mm"]["whole"], abs=0.02)
 
 
+def test_an_axis_that_points_up_in_the_truth_alone_is_named(shell, folder, tmp_path):
+    turned = TRUTH.positions[..., [0, 2, 1]] * [1, 1, -1]
+    write_joints(tmp_path / "y up.csv", JointTable(TRUTH.times, TRUTH.names, turned))
+    _, _, err = shell(folder / "run", "y up.csv", "--json")
+    assert "+Y points up in y up.csv: `shadowpuppet convert 'y up.csv' truth.csv` turns it" in err
+
+
+@pytest.mark.parametrize(("scale", "match"), [(1000, "are these millimetres?"), (100, "are these centimetres?"), (0.01, "times as large as the run's, expected metres")])
+def test_a_truth_in_another_unit_is_refused(shell, folder, tmp_path, scale, match):
+    write_joints(tmp_path / "far.csv", JointTable(TRUTH.times, TRUTH.names, scale * TRUTH.positions))
+    code, out, err = shell(folder / "run", "far.csv", "--json")
+    assert (code, out) == (2, "")
+    assert "far.csv: found a person" in err
+    assert match in err
+
+
 def test_a_run_in_the_truth_s_world_is_not_warned_of(folder):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("shadowpuppet.evaluation.evaluation.warn", lambda *_, **__: pytest.fail("warned"))

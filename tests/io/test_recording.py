@@ -292,7 +292,7 @@ def test_a_run_is_no_recording(one):
     write_calibration(one.parent / "run" / "calibration.toml", cameras("cam"))
     (one.parent / "run" / "run.toml").write_text("complete = true\n")
     for _ in range(2):
-        with pytest.raises(RecordingError, match=r"run: found a run, .*, expected a recording; `shadowpuppet view`, .*run/run\.toml"):
+        with pytest.raises(RecordingError, match=r"run: found a run, .*; `shadowpuppet view`, `evaluate` and `export` .*run/run\.toml"):
             read_recording(one.parent / "run")
         film(one.parent / "run" / "overlay.mp4")
     (one / "run.toml").write_text("complete = true\n")

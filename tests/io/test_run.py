@@ -340,9 +340,9 @@ def without_last_line(path: Path) -> None:
 
 
 def test_a_recording_is_reported_from_a_run(tmp_path):
-    (tmp_path / "lab" / "video").mkdir(parents=True)
-    with pytest.raises(FormatError, match=r"lab: found no run\.toml in it, .*; it is a recording: track it first \(shadowpuppet track "):
-        read_run(tmp_path / "lab")
+    (tmp_path / "the lab" / "video").mkdir(parents=True)
+    with pytest.raises(FormatError, match=r"lab: found no run\.toml in it, .* a recording: track it first \(`shadowpuppet track '.*lab'`\)"):
+        read_run(tmp_path / "the lab")
 
 
 def put(content: bytes):

@@ -159,7 +159,7 @@ def test_a_film_with_nobody_in_it_leaves_nothing(pictures, tmp_path, capsys):
     assert cli.run(command(tmp_path / "empty.mp4", tmp_path / "run", "--speed", "2")) == 0
     err = capsys.readouterr().err
     assert "nobody was tracked: nothing was written; the film ended before" in err
-    assert f"`track {tmp_path / 'empty.mp4'}` follows the person in all of it" in err
+    assert f"`shadowpuppet track {tmp_path / 'empty.mp4'}` follows the person in all of it" in err
     assert not (tmp_path / "run").exists()
 
 

@@ -173,10 +173,13 @@ def test_films_of_other_rates_and_lengths_are_doubted(spoilt):
         (spoilt / kind / "cam2.mkv").unlink(missing_ok=True)
     (doubt,) = [d for d in looked(spoilt, Options()).doubts if "rates" in d]
     assert "cam2 5" in doubt
+    assert doubt.short == "camera 'cam2' is of another frame rate: film at one"
     made.write_film(spoilt / "video" / "cam2.mp4", frames[:15], made_rig.RATE)
     (doubt,) = [d for d in looked(spoilt, Options()).doubts if "lengths" in d]
     assert "cam2 1.50" in doubt
     assert "[start] of recording.toml" in doubt
+    (spoilt / "recording.toml").write_text("[start]\ncam2 = 0.2\n", encoding="utf-8")
+    assert not [d for d in looked(spoilt, Options()).doubts if "lengths" in d]  # it has been said when each began
 
 
 def test_swapped_films_are_reported(spoilt):

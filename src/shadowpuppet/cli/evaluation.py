@@ -26,7 +26,7 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     run
         Folder that `track` made.
     truth
-        Joints to compare with: .csv, .trc, .c3d, .bvh or .amc. [default: the recording's truth]
+        Joints to compare with: .csv, .trc, .c3d, .bvh, .amc, .npz or .parquet. [default: the recording's truth]
     joints
         Joints to compare, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
     start
@@ -147,7 +147,7 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if gait := gait_text(measured["gait"]):
         yield "gait", gait
     if "errors" not in measured:
-        yield "truth", "none is known: nothing is compared; name a file of joints, .csv, .trc, .c3d, .bvh or .amc"
+        yield "truth", "none is known: nothing is compared; name a file of joints, .csv, .trc, .c3d, .bvh, .amc, .npz or .parquet"
         return
     yield "clock", clock_text(measured["clock"])
     if measured["world"]:

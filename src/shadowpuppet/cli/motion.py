@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from shadowpuppet.body.models import WHOLE, WholeBodyName
 from shadowpuppet.cli.flags import LEARNING, Quiet, Switch, flags_of, given, output, unpacked
 from shadowpuppet.cli.tables import pairs, show, show_json, table
-from shadowpuppet.errors import SettingsError, choices, extra_command
+from shadowpuppet.errors import SettingsError, choices, extra_command, typed
 from shadowpuppet.io.motion import EXPORTS, READABLE
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.settings import settings_of, validate
@@ -200,4 +200,4 @@ def _prior_tables(trained: TrainedPrior, file: Path) -> Iterator[Any]:
     yield pairs([("prior", f"{len(prior.subspaces)} regions of {prior.subspaces.dimensions} dimensions; {len(prior.names)} degrees of "
                            f"freedom, {prior.rate:g} frames/s"),
                  ("loses", f"{np.degrees(trained.error):.2f} degrees, {1000 * trained.joint_error:.1f} mm at the joints"),
-                 ("saved", str(file)), ("track", f"shadowpuppet track RECORDING --prior {file}")])  # fmt: skip
+                 ("saved", str(file)), ("track", typed("track", "RECORDING", "--prior", file))])  # fmt: skip

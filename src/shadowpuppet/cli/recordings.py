@@ -28,8 +28,8 @@ from shadowpuppet.cli.flags import (
     switch,
     unpacked,
 )
-from shadowpuppet.cli.tables import pairs, show, show_json, show_next, typed
-from shadowpuppet.errors import SettingsError, ShadowPuppetError, choices, reason
+from shadowpuppet.cli.tables import pairs, show, show_json, show_next
+from shadowpuppet.errors import SettingsError, ShadowPuppetError, choices, reason, typed
 from shadowpuppet.settings import validate
 from shadowpuppet.synthetic.collection import named_specs
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values

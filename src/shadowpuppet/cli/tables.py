@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import shlex
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console, RenderableType
+from rich.console import Console, Group, RenderableType
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
@@ -21,21 +20,30 @@ if TYPE_CHECKING:
 SENSES = {"uncertain": " (the outline fits badly)", "predicted": " (bridged or unseen)", "lost": " (nothing fits)",
           "absent": " (nobody in the picture)"}
 """What a frame's status says, beside it in a table; `tracked` needs no words."""
+ANY_WIDTH = 10_000
+"""Columns that are more than any table needs."""
 
 
 def show(*parts: RenderableType) -> None:
-    """Print tables with an empty line between them."""
+    """Print tables with an empty line between them; where there is no terminal, as wide as they need, so that nothing is cut off."""
     console = Console(file=sys.stdout, highlight=False)
+    usual = console.width
     for n, part in enumerate(parts):
+        if not console.is_terminal:
+            console.width = max(usual, _least_width(console, part))
         with console.capture() as captured:
             console.print(part)
         lines = [line.rstrip() for line in captured.get().splitlines()]  # rich pads columns with blanks
         print("\n" * bool(n) + "\n".join(lines))
 
 
-def typed(*words: object) -> str:
-    """A command of this program as it is typed here: words with blanks are quoted."""
-    return f"{os.environ.get('SHADOWPUPPET_COMMAND', 'shadowpuppet')} {shlex.join(map(str, words))}"
+def _least_width(console: Console, part: RenderableType) -> int:
+    """Columns below which a table cuts cells off; 0 for what folds them instead."""
+    if isinstance(part, Group):
+        return max((_least_width(console, each) for each in part.renderables), default=0)
+    if not isinstance(part, Table) or not all(column.no_wrap for column in part.columns):
+        return 0
+    return Measurement.get(console, console.options.update(max_width=ANY_WIDTH), part).maximum
 
 
 def show_next(*commands: str) -> None:
@@ -83,6 +91,13 @@ def verdict_table(verdict: Verdict, title: str) -> RenderableType:
     """One word, and the reasons below it."""
     joined = "but" if verdict.word == "good" else "because"
     return pairs([(title, verdict.word), *(("" if n else joined, reason) for n, reason in enumerate(verdict.reasons))])
+
+
+def verdict_of(plain: Mapping[str, Any], title: str) -> RenderableType:
+    """The table of a verdict as a run's metrics keep it."""
+    from shadowpuppet.pipeline.verdict.verdict import Verdict
+
+    return verdict_table(Verdict(plain["word"], tuple(plain["reasons"])), title)
 
 
 def files_in(folder: Path, *names: str) -> tuple[str, str]:

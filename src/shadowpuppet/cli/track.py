@@ -25,12 +25,11 @@ from shadowpuppet.cli.flags import (
     switch,
     unpacked,
 )
-from shadowpuppet.cli.tables import error_table, files_in, metrics_table, pairs, people_table, show, show_next, table, typed, verdict_table
-from shadowpuppet.errors import PERSON_LOST, SettingsError, ShadowPuppetError
+from shadowpuppet.cli.tables import error_table, files_in, metrics_table, pairs, people_table, show, show_next, table, verdict_of
+from shadowpuppet.errors import PERSON_LOST, SettingsError, ShadowPuppetError, typed
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.stream.settings import OutletSettings
 from shadowpuppet.pipeline.options import PATHS, Options
-from shadowpuppet.pipeline.verdict.verdict import Verdict
 from shadowpuppet.settings import validate
 
 if TYPE_CHECKING:
@@ -109,7 +108,8 @@ def _people_done(folder: Path, metrics: Mapping[str, Any], quiet: bool) -> int:
     people = metrics["people"]
     if not quiet:
         names = [f"person-{number}" for number in people]
-        show(people_table(people), pairs([("speed", f"{metrics['frames_per_s']:.1f} frame sets/s"),
+        verdicts = [verdict_of(each["verdict"], f"person {number}") for number, each in people.items() if "verdict" in each]
+        show(people_table(people), *verdicts, pairs([("speed", f"{metrics['frames_per_s']:.1f} frame sets/s"),
                                           files_in(folder, "people.csv", "overlay.mp4", *names)]))
     lost = [number for number, each in people.items() if is_lost(each["status"], each["frames"])]
     if len(lost) < len(people):
@@ -123,7 +123,7 @@ def _after_a_film(camera: str) -> str:
     if not Path(camera).exists():
         return ""
     return ("; the film ended before its scene was found and the person measured: give a shorter --learn, or --background with the empty "
-            f"scene; `track {camera}` follows the person in all of it")
+            f"scene; `{typed('track', camera)}` follows the person in all of it")
 
 
 def _check_earlier(folder: Path, force: bool, resumes: bool = True) -> None:
@@ -261,7 +261,7 @@ def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
     errors = [error_table(metrics["errors"])] if "errors" in metrics else []
     files = files_in(folder, *pictures, "overlay.mp4", "joints.csv", "angles.csv", "intervals.csv")
     verdict = metrics.get("verdict")
-    said = [verdict_table(Verdict(verdict["word"], tuple(verdict["reasons"])), "verdict on the run")] if verdict else []
+    said = [verdict_of(verdict, "verdict on the run")] if verdict else []
     show(*said, metrics_table(metrics), *errors, pairs([("speed", speed), files]))
 
 

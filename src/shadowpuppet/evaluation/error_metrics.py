@@ -17,7 +17,7 @@ pelvis."""
 HINGES = {f"{side}_{joint}": tuple(f"{side}_{name}" for name in chain) for side in ("left", "right")
          for joint, chain in {"elbow": ("shoulder", "elbow", "wrist"), "knee": ("hip", "knee", "ankle")}.items()}
 """The three joints that define the angle of each hinge."""
-MISALIGNED_ERROR, MISALIGNED_SHARE = 0.2, 0.4
+MISALIGNED_ERROR, MISALIGNED_SHARE = 0.1, 0.4
 """Run and truth seem to be in two worlds above this mean error, metres, if one rigid motion leaves less than this share of it."""
 
 

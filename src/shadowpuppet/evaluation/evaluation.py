@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import ShadowPuppetError, warn
+from shadowpuppet.errors import FormatError, ShadowPuppetError, warn
 from shadowpuppet.evaluation.error_metrics import (
     acceleration_errors,
     aligned_errors,
@@ -32,13 +33,16 @@ from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.contacts import read_contacts
 from shadowpuppet.io.files.plain import for_json, plain
 from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.io.motion.motion_files import names_in, read_truth
+from shadowpuppet.io.motion.motion_files import names_in, read_truth, up_axis
 from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.io.run_writer import FILES, write_metrics
 from shadowpuppet.motion.metrics import GROUPS, JointErrors, evaluate, joint_errors
 from shadowpuppet.motion.motion import ROUNDING, JointTable
 from shadowpuppet.motion.synchronization import at_common_times, at_times, find_offset, step_of
 from shadowpuppet.video.moments import read_moment
+
+OTHER_UNIT = 10.0
+"""Ratio of the sizes of the truth's person and the run's from which one of them is in another unit."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +101,8 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
     read = _cut(_within(run, read_truth(table, run.motion.joint_names), how), how, table)
     reference, clock = _on_our_clock(run, read, how, table)
     try:
-        reference, world = _in_our_world(run, reference, how)
+        _check_unit(run.motion.table, reference, table)
+        reference, world = _in_our_world(run, reference, how, table)
         measured = evaluate(run.motion, reference, _joint_names(how.joints), camera=_single_camera(cameras), cameras=max(len(cameras), 1))
     except ShadowPuppetError as error:
         names = names_in(table)
@@ -211,7 +216,23 @@ def _on_our_clock(run: Run, truth: JointTable, how: Comparison, path: str | Path
         {"speed_error_m_s": found.error, "speed_error_before_m_s": found.before, "rival_s": found.rival} if found else {})
 
 
-def _in_our_world(run: Run, truth: JointTable, how: Comparison) -> tuple[JointTable, dict[str, Any]]:
+def _check_unit(run: JointTable, truth: JointTable, path: str | Path) -> None:
+    """Raise `FormatError` if the truth's people are far from the size of the run's."""
+    ours, theirs = map(_extent, (run, truth))
+    ratio = theirs / ours if ours > 0 else np.nan
+    if ratio > OTHER_UNIT or ratio < 1 / OTHER_UNIT:
+        raise FormatError(f"{path}: found a person {ratio:.3g} times as large as the run's, expected metres"
+                          + (": are these millimetres?" if 500 < ratio < 2000 else ": are these centimetres?" if 50 < ratio < 200 else ""))
+
+
+def _extent(table: JointTable) -> float:
+    """Median distance of the joints from their middle; NaN if nothing is known."""
+    frames = table.positions[np.isfinite(table.positions).all(2).sum(1) > 1]
+    away = np.linalg.norm(frames - np.nanmean(frames, axis=1, keepdims=True), axis=2)
+    return float(np.nanmedian(away)) if len(frames) else np.nan
+
+
+def _in_our_world(run: Run, truth: JointTable, how: Comparison, path: str | Path) -> tuple[JointTable, dict[str, Any]]:
     """The truth, moved into the run's world if `how.align`, and `world_difference`; warns if it seems to be in another world."""
     if not len(run.motion):
         return truth, {}
@@ -226,8 +247,16 @@ def _in_our_world(run: Run, truth: JointTable, how: Comparison) -> tuple[JointTa
     if world.get("apart"):
         warn(f"the run's joints are {world['mean_mm']:.0f} mm from the truth's, but {world['aligned_mm']:.0f} mm once the run is turned by "
              f"{world['rotation_deg']:.0f} degrees and moved by {np.linalg.norm(world['moved_mm']):.0f} mm as a whole: are they in two "
-             "worlds, or is the distance wrong? --align compares after that")
+             "worlds, or is the distance wrong? --align compares after that" + _turned_up(ours, theirs, path))
     return truth, world | ({"moved": False} if world else {})
+
+
+def _turned_up(run: JointTable, truth: JointTable, path: str | Path) -> str:
+    """What to do about a truth in which another axis is up than in the run, as text; empty if it is the same."""
+    axis = up_axis(truth)
+    if axis == "+z" or up_axis(run) != "+z":
+        return ""
+    return f"; {axis.upper()} points up in {path}: `shadowpuppet convert {shlex.quote(str(path))} truth.csv` turns it"
 
 
 def _joint_names(joints: Sequence[str] | None) -> list[str] | None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from shadowpuppet.body.sizes import DISTANCES, HEIGHTS
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import RecordingError, choices, reason, warn
+from shadowpuppet.errors import RecordingError, choices, reason, typed, warn
 from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, read_calibration
 from shadowpuppet.io.calibration.formats import find_calibration
 from shadowpuppet.io.projects import Project, films_in, find_project, sources_in
@@ -27,6 +27,15 @@ BLOCK, MAX_PADDING = 16, 0.05
 """Pixels to a side of H.264's blocks, and the largest share of a picture's side by which they may exceed it to be taken for padding."""
 STARTS, DURATIONS = (0.0, 100_000.0), (1e-3, 1e6)
 """Limits of `start` and `duration`, seconds."""
+
+
+class UncalibratedError(RecordingError):
+    """A recording that has films of cameras of which no calibration is known."""
+
+    def __init__(self, message: str, cameras: Iterable[str] = (), known: Iterable[str] = ()) -> None:
+        """The sentence, the names of these cameras, and those of which one is known."""
+        super().__init__(message)
+        self.cameras, self.known = tuple(cameras), tuple(known)
 
 
 @dataclass(frozen=True)
@@ -107,8 +116,7 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
                              f"{_like(folder)}")
     if is_run(folder):
         raise RecordingError(f"{folder}: found a run, as `shadowpuppet track` writes it, expected a recording; `shadowpuppet view`, "
-                             f"`evaluate`, `export` and `report` read runs; `track` reads the recording that was tracked, named in {folder}"
-                             "/run.toml")
+                             f"`evaluate` and `export` read runs; `track` reads the recording that was tracked, named in {folder}/run.toml")
     if project is not None or (folder.is_dir() and (_is_own(folder) or films_in(folder))):
         return _read_folder(project.folder if project else folder, fov, calibration, project, asked)
     if folder.is_dir() and not any(p.suffix.lower() in IMAGE_SUFFIXES for p in folder.iterdir()):
@@ -258,13 +266,13 @@ def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration
         told = {key: notes.choice(key, known) for key, known in (("unit", UNITS), ("up", UPS))} if notes else {}
         return read_calibration(calibration, sizes=size, **told)
     if len(films) > 1:
-        raise RecordingError(f"{folder}: no calibration.toml for its {len(films)} cameras ({choices(films)}); several cameras must be "
-                             "calibrated together: by films of a printed board in another folder (`shadowpuppet calibrate BOARD_FOLDER`, "
-                             "docs/calibration.md), or by the person who walks there, from a "
-                             f"rough.toml that says where they stand (`shadowpuppet calibrate {folder} --from-person`)")
+        by_board, by_person = typed("calibrate", "BOARD_FOLDER"), typed("calibrate", folder, "--from-person", "--height", "METRES")
+        raise UncalibratedError(f"{folder}: no calibration.toml for its {len(films)} cameras ({choices(films)}); several cameras must be "
+                                f"calibrated together: by films of a printed board in another folder (`{by_board}`, docs/calibration.md), "
+                                f"or by the person who walks there, from a rough.toml that says where they stand (`{by_person}`)", films)
     if fov is None:
-        raise RecordingError(f"{folder}: no calibration: give the camera's horizontal field of view (--fov DEGREES, option fov; a "
-                             "phone held across has about 65, held upright 40, a webcam 60) or a calibration.toml")
+        raise UncalibratedError(f"{folder}: no calibration: give the camera's horizontal field of view (--fov DEGREES, option fov; a "
+                                "phone held across has about 65, held upright 40, a webcam 60) or a calibration.toml", films)
     name, film = next(iter(films.items()))
     return (Camera.from_fov(open_frames(film).size, fov, name),)
 
@@ -274,9 +282,10 @@ def _check_names(place: Path, sources: Iterable[str], cameras: Iterable[Camera],
     known = [camera.name for camera in cameras]
     unknown = sorted(name for name in set(sources) - set(known) if asked is None or name in asked)
     if unknown:
-        remedy = "; a film has the name of its camera; --camera leaves films out" if kind == "video" else ""
-        raise RecordingError(f"{place}: found {choices(unknown)}, but the calibration knows no such camera; cameras known: "
-                             f"{choices(known)}{remedy}")
+        found = f"{place}: found {choices(unknown)}, but the calibration knows no such camera; cameras known: {choices(known)}"
+        if kind == "video":
+            raise UncalibratedError(f"{found}; a film has the name of its camera; --camera leaves films out", unknown, known)
+        raise RecordingError(found)
 
 
 def _without_padding(view: View) -> View:

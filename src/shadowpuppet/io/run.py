@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.errors import FormatError, shown
+from shadowpuppet.errors import FormatError, shown, typed
 from shadowpuppet.io.files.table import Table, read_table
 from shadowpuppet.io.files.text import errors_named, read_limited, read_toml
 from shadowpuppet.io.motion.npz import read_motion_npz
@@ -70,9 +70,11 @@ class Run:
 def read_run(folder: str | Path) -> Run:
     """Read a run folder, also a killed run's. Raises `FormatError`, naming file, line and column, if something is malformed."""
     folder = Path(folder)
+    if not folder.exists():
+        raise FormatError(f"{folder}: no such folder, expected that of a run, as `shadowpuppet track` writes it")
     if not (folder / "run.toml").exists():
         film = any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml"))
-        hint = f"; it is a recording: track it first (shadowpuppet track {folder})" if film else ""
+        hint = f"; it is a recording: track it first (`{typed('track', folder)}`)" if film else ""
         raise FormatError(f"{folder}: found no run.toml in it, expected the folder of a run, as `shadowpuppet track` writes it{hint}")
     info = read_toml(folder / "run.toml", FormatError)
     _check_info(folder / "run.toml", info)

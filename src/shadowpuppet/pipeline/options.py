@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 
 from shadowpuppet.body.models import WHOLE, BodyName
 from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, expected_metres
-from shadowpuppet.errors import SettingsError, choices
+from shadowpuppet.errors import SettingsError, choices, warn
 from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.settings import checked, plain_values, settings_of, validate
@@ -36,6 +36,8 @@ WITH_PRESETS: dict[str, tuple[Mapping[str, Any], Callable[..., Any]]] = {
     "tracker": (PRESETS, make_settings), "multiview": (MULTIVIEW_PRESETS, make_multiview_settings),
     "initialization": (INITIALIZATION_PRESETS, make_initialization)}  # fmt: skip
 """For each table of settings that has presets: these, and the function that makes the settings."""
+OF_ONE, OF_SEVERAL = ("distance", "facing", "tracker", "initialization"), ("prior", "appearance", "multiview", "training")
+"""Options that matter with one camera only, and with several only."""
 PATHS = ("calibration", "background", "person", "prior")
 """Options that are file names, relative to the folder of the settings file that contains them."""
 
@@ -166,6 +168,30 @@ def settings_in(data: Mapping[str, Any], path: Path, source: str | None = None) 
     if unknown := set(data) - names:
         raise SettingsError(f"{source or path}: unknown setting {min(unknown)!r}; there are: {choices(names)}")
     return data | {key: str(path.parent / data[key]) for key in PATHS if isinstance(data.get(key), str)}
+
+
+def check_used(options: Options, several: bool) -> None:
+    """Warn of options that were changed and have no effect with one camera, or with `several`. Raises `SettingsError` for the preset of a
+    paper about the other."""
+    presets, cameras = (MULTIVIEW_PRESETS, "several cameras") if several else (PRESETS, "one camera")
+    if options.preset not in presets:
+        instead = ", or one camera (--camera)" if several else ""
+        raise SettingsError(f"preset: found {options.preset!r}, a method for {'one camera' if several else 'several cameras'}; expected with "
+                            f"{cameras} one of {choices(presets)}{instead}")
+    given = {name: getattr(options, name) for name in ("preset", "body") if getattr(options, name) is not None}
+    usual, now = plain_values(make_options(given)), plain_values(options)
+    idle = [name for key in (OF_ONE if several else OF_SEVERAL) for name in _changed(key, usual[key], now[key])]
+    if idle:
+        warn(f"no effect with {cameras}: {', '.join(idle)}")
+
+
+def _changed(name: str, usual: Any, now: Any) -> Iterator[str]:
+    """Names of the settings that differ, with those of the tables in which they stand."""
+    if isinstance(now, dict):
+        for key in now:
+            yield from _changed(f"{name}.{key}", usual[key], now[key])
+    elif now != usual:
+        yield name
 
 
 def plain_options(options: Options) -> dict[str, Any]:

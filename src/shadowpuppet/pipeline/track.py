@@ -19,7 +19,7 @@ from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter, write_metrics
 from shadowpuppet.motion.motion import BLANK, Motion, MotionBuilder, MotionFrame
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.look import Survey
-from shadowpuppet.pipeline.options import Options, plain_options
+from shadowpuppet.pipeline.options import Options, check_used, plain_options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
 from shadowpuppet.pipeline.prepare import Kind, Prepared, fit_survey, kind_of, look_around
 from shadowpuppet.pipeline.progress import (
@@ -79,6 +79,7 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
         resume: bool = False) -> Summary:
     """Survey, fit, track and evaluate; see `track_recording`."""
     for_look, for_track = generators(options)
+    check_used(options, rig.is_multiview)
     body, recording = average_body(getattr(options, kind.settings).body), rig.recording
     info = {"recording": recording.path.resolve(), "method": kind.method.format(len(rig.cameras)),
             "cameras": list(rig.names) if rig.is_multiview else None, "settings": plain_options(options),
@@ -121,6 +122,9 @@ def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: L
     found = people.track(*rngs, smooth_run)
     if not found:
         raise TrackingError(f"{survey.look.recording}: nobody is found in the silhouettes of {survey.census.number} people")
+    if len(found) < survey.census.number:
+        warn(f"{survey.look.recording}: {survey.census.number} people were counted, {len(found)} could be followed: a person whom few "
+             "cameras show whole, or who is seen for less than a second, is not")
     writer.info["people"] = len(found)
     first = read_run(person_folder(writer.folder, min(found)))
     return Summary(writer.folder, first.motion, people.metrics | {"people": found}, survey.look)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from importlib.util import find_spec
 
 import biovision
 import numpy as np
@@ -15,7 +16,9 @@ from vicon import c3d
 
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
 from shadowpuppet.io.motion.motion_files import names_in, read_truth
-from shadowpuppet.io.motion.table import write_joints
+from shadowpuppet.io.motion.npz import write_npz
+from shadowpuppet.io.motion.parquet import write_parquet
+from shadowpuppet.io.motion.table import table_columns, write_joints
 from shadowpuppet.motion.metrics import LIMB_JOINTS
 
 VICON = {"pelvis": "PELO", "neck": "TRXO", "head": "HEDO",
@@ -23,12 +26,17 @@ VICON = {"pelvis": "PELO", "neck": "TRXO", "head": "HEDO",
             (("shoulder", "CLO"), ("elbow", "HUO"), ("wrist", "RAO"), ("hip", "FEP"), ("knee", "FEO"), ("ankle", "TIO"))}}  # fmt: skip
 
 
-def test_the_same_comes_of_csv_trc_and_c3d(tmp_path):
+def test_the_same_comes_of_every_table_of_joints(tmp_path):
     table = person(0.5).select(list(VICON))
     write_joints(tmp_path / "truth.csv", table)
     write_joints(tmp_path / "truth.trc", moved(table, names=[name.replace("_", " ").title().replace(" ", "") for name in table.names]))
     (tmp_path / "truth.c3d").write_bytes(c3d(list(VICON.values()), 1000 * table.positions, rate=30.0))
-    for ending in ("csv", "trc", "c3d"):
+    write_npz(tmp_path / "truth.npz", table)
+    endings = ["csv", "trc", "c3d", "npz"]
+    if find_spec("pyarrow"):
+        write_parquet(tmp_path / "truth.parquet", table_columns(table))
+        endings.append("parquet")
+    for ending in endings:
         read = read_truth(tmp_path / f"truth.{ending}")
         assert set(read.names) == set(table.names)
         np.testing.assert_allclose(read.select(table.names).positions, table.positions, atol=2e-6)

@@ -13,7 +13,7 @@ import pytest
 from solids import Ellipsoid, ring, seen_by
 
 from shadowpuppet.camera.mask import Seen
-from shadowpuppet.errors import NOTED, FormatError, SettingsError, ShadowPuppetError
+from shadowpuppet.errors import NOTED, FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid, rotation_about
 from shadowpuppet.io.checkpoint import FRAMES as EXACT
 from shadowpuppet.io.checkpoint import STATE
@@ -83,8 +83,9 @@ def tracked(seen, tmp_path_factory):
     opened = open_rig(recording, options)
     survey = MULTIVIEW.survey(opened, options)
 
-    def track(folder, listener=None, resume=False, **changed):
-        kind = MULTIVIEW._replace(survey=lambda *_, **__: survey)
+    def track(folder, listener=None, resume=False, counted=2, **changed):
+        shown = replace(survey, census=replace(survey.census, number=counted))
+        kind = MULTIVIEW._replace(survey=lambda *_, **__: shown)
         return track_run(opened, kind, folder, replace(options, **changed), listener or Listener(), resume=resume)
 
     return track
@@ -192,6 +193,12 @@ def test_places_are_those_of_the_people(run):
 def test_the_number_is_said(run):
     assert "2 people are in the recording" in str(run.look.doubts[0])
     assert set(run.metrics["people"]) == {1, 2}
+
+
+def test_who_was_counted_and_cannot_be_followed_is_said(tracked, tmp_path):
+    with pytest.warns(ShadowPuppetWarning, match="3 people were counted, 2 could be followed: "):
+        found = tracked(tmp_path / "run", counted=3, overlay=False)
+    assert set(found.metrics["people"]) == {1, 2}
 
 
 def sets_of(sets):

@@ -89,11 +89,13 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
 def _from_person(recording: Path, height: float | None, masks: bool, to: Path | None) -> int:
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.options import make_options
-    from shadowpuppet.pipeline.repair.placing import open_rough, place_cameras, write_placed
+    from shadowpuppet.pipeline.repair.placing import NO_HEIGHT, open_rough, place_cameras, write_placed
 
     options = make_options({"height": height, "masks": masks})
     with terminal() as listener:
         rig, rough_focal = open_rough(recording, options)
+        if options.height is None and rig.recording.subject.height is None:
+            listener.warn(NO_HEIGHT)  # before the work and what it writes
         placed = place_cameras(rig, options, listener, rough_focal)
         written = write_placed(rig, placed, to)
         listener.stop()

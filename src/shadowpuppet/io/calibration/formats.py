@@ -17,7 +17,7 @@ from shadowpuppet.io.calibration.number_blocks import read_biocv, read_krt
 from shadowpuppet.io.calibration.opencv import SUFFIXES, files_of, pair_of, read_opencv
 from shadowpuppet.io.calibration.pose2sim import read_tables
 from shadowpuppet.io.calibration.qualisys import read_qualisys
-from shadowpuppet.io.calibration.rough import is_rough, read_rough
+from shadowpuppet.io.calibration.rough import ROUGH_NAME, is_rough, read_rough
 from shadowpuppet.io.calibration.vicon import read_vicon
 
 ENDINGS = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".cal", ".calib", ".krt", ".pickle", ".pkl")
@@ -55,7 +55,7 @@ OPENCV = Format("OpenCV (YAML, XML)",
 HUMANEVA = Format("HumanEva (.cal)", lambda path, text: _ends(path, ".cal"), read_bouguet)
 TABLES = Format("TOML (Pose2Sim, Anipose, FreeMoCap, Caliscope)",
                 lambda path, text: _ends(path, ".toml") or all(f"\n{key}" in f"\n{text}" for key in ("matrix", "distortions")), read_tables)
-ROUGH = Format("rough places (TOML with at, toward, fov)", lambda path, text: is_rough(text), read_rough)
+ROUGH = Format("rough places (TOML with at, toward, fov)", lambda path, text: path.name == ROUGH_NAME or is_rough(text), read_rough)
 COLMAP = Format("COLMAP (cameras.txt, images.txt)", lambda path, text: is_colmap(path), read_colmap)
 JSON = Format("JSON", lambda path, text: _ends(path, ".json"), read_json)
 KALIBR = Format("Kalibr (camchain.yaml)", lambda path, text: CAMERA.search(text) is not None and "camera_model" in text, read_kalibr)

@@ -19,10 +19,13 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
 from shadowpuppet.io.calibration.draft import Draft, Drafts
+from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import read_toml
 
 FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
 """Required in a camera's section. Defaults: `name` is the section's, `fisheye` false."""
+KNOWN = (*FIELDS, "name", "fisheye", "oriented", "ignore", "port", "cam_id")
+"""Keys that are read; those of other programs are passed over."""
 BARE_KEY = r"[A-Za-z0-9_-]+"
 """Section titles without quotes."""
 SQUARES = {"mm": (5.0, 500.0), "m": (0.005, 0.5)}
@@ -91,7 +94,9 @@ def _draft(path: Path, title: str, table: dict[str, Any], name: object) -> Draft
             if not isinstance(table.get(key, True), bool):
                 raise CalibrationError(f"{key}: found {table[key]!r}, expected true or false")
         if missing:
-            raise CalibrationError(f"{', '.join(missing)}: missing, expected {', '.join(FIELDS)}")
+            unknown = [key for key in table if key not in KNOWN]
+            found = f"; found {shorten(unknown)}, which {'is' if len(unknown) == 1 else 'are'} not known" if unknown else ""
+            raise CalibrationError(f"{', '.join(missing)}: missing, expected {', '.join(FIELDS)}{found}")
         size, matrix = numbers_in(table, "size", [(2,)]), numbers_in(table, "matrix", [(3, 3)])
         T = rigid(_rotation(table), _flat(table, "translation", [(3,)]))
         return Draft(str(name), matrix, _flat(table, "distortions"), T, size.tolist(), table.get("fisheye", False),

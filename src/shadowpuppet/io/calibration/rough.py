@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.errors import CalibrationError
+from shadowpuppet.errors import CalibrationError, did_you_mean
 from shadowpuppet.geometry import Array, rigid, unit
 from shadowpuppet.io.calibration.draft import Draft, Drafts
 from shadowpuppet.io.calibration.pose2sim import check_name, numbers_in
 from shadowpuppet.io.files.text import read_toml
 
+ROUGH_NAME = "rough.toml"
+"""Name of a recording's file of this kind, which counts before its calibration."""
 FIELDS = ("at", "toward", "fov")
 SECTION = re.compile(r"^\s*toward\s*=", re.MULTILINE)
 STEEPEST = 0.999
@@ -37,6 +39,9 @@ def read_rough(path: Path) -> Drafts:
 def _draft(path: Path, title: str, table: dict[str, Any]) -> Draft:
     try:
         check_name(title)
+        known = (*FIELDS, "size")
+        if unknown := next((key for key in table if key not in known), None):
+            raise CalibrationError(f"{unknown}: no such value; possible are {', '.join(known)}{did_you_mean(unknown, known)}")
         if missing := [key for key in FIELDS if key not in table]:
             raise CalibrationError(f"{', '.join(missing)}: missing, expected {', '.join(FIELDS)}")
         at, toward = (numbers_in(table, key, [(3,)]) for key in ("at", "toward"))

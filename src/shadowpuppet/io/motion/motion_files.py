@@ -80,7 +80,7 @@ def read_truth(path: str | Path, known: Sequence[str] = JOINTS) -> JointTable:
     _check_ending(path)
     if ending in (".bvh", ".amc"):
         return read_motion(path)
-    table = read_c3d(path) if ending == ".c3d" else read_joints(path)
+    table = READERS[ending](path)
     same = [name for name in table.names if name in known and name not in JOINTS]
     if not columns_of(table.names) and not pairs_of(table.names):
         if same:

@@ -14,8 +14,10 @@ from shadowpuppet.calibration.silhouettes import Row
 from shadowpuppet.calibration.solve.tangency_bundle import ROUGH_FOCAL, TangencyFit, place_by_outlines
 from shadowpuppet.calibration.time_offset import time_offsets
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import CalibrationError
+from shadowpuppet.errors import CalibrationError, typed
 from shadowpuppet.geometry import Array, inverse, rigid, rotation_from_vector, unit
+from shadowpuppet.io.calibration.rough import ROUGH_NAME
+from shadowpuppet.io.recording import UncalibratedError
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.repair.check import SilhouetteSets, aligned_sets, gather_silhouettes
@@ -47,8 +49,9 @@ MAX_FOCAL_DOUBT = 0.01
 """Relative doubt about a focal length that is not remarked on."""
 STATED_FOCAL = ("fields of view stay as they are stated: this film does not tell them; a person who walks near and far would, and a board "
                 "filmed by each camera (`shadowpuppet calibrate LAB`)")
-ROUGH_NAME = "rough.toml"
-"""Name of a recording's file with rough places (`io.calibration.rough`), which counts before its calibration."""
+ROUGH_EXAMPLE = "at = [2.5, -3.0, 1.4], toward = [0.0, 0.0, 1.0], fov = 65"
+"""What such a file says of a camera, for messages."""
+NO_HEIGHT = "the scale is the rough calibration's: state the person's --height, in metres with shoes on"
 MANY_FAR = 0.15
 """Share of tangents that are far apart (`TangencyFit.far`) that is remarked on."""
 MOST_FAR = 0.5
@@ -94,9 +97,26 @@ def open_rough(recording: Path, options: Options) -> tuple[Rig, float]:
     """The rig of a recording with cameras as its rough.toml places them, or else its calibration; and the `rough_focal` of their lenses,
     0 if they are known. Raises a `ShadowPuppetError`."""
     file = recording / ROUGH_NAME
-    if not file.exists():
-        return open_rig(recording, options), 0.0
-    return open_rig(recording, replace(options, calibration=file)), ROUGH_FOCAL
+    try:
+        if not file.exists():
+            return open_rig(recording, options), 0.0
+        return open_rig(recording, replace(options, calibration=file)), ROUGH_FOCAL
+    except UncalibratedError as error:
+        raise CalibrationError(_without_places(recording, error, file.exists())) from None
+
+
+def _without_places(recording: Path, error: UncalibratedError, begun: bool) -> str:
+    """What to write about the places of cameras of which there are films; `begun`: there is a rough.toml, without them."""
+    file, cameras = recording / ROUGH_NAME, error.cameras
+    if len(cameras) == 1 and not error.known:
+        return f"{recording}: found one camera, expected two or more: outlines are compared"
+    command = typed("calibrate", recording, "--from-person", "--height", "METRES")
+    return (f"{file}: {'it does not say' if begun else 'no such file, which says'} where {', '.join(cameras)} stand{'s' * (len(cameras) == 1)}; "
+            f"write for each film a section such as [{cameras[0]}] with three lines: {ROUGH_EXAMPLE} (metres, z up; degrees across the "
+            f"picture; docs/calibration.md), or move films that are not to be used out of the folder; then `{command}`, with the person's "
+            "height")
+
+
 
 
 def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, rough_focal: float = 0.0) -> Placed:
@@ -193,7 +213,7 @@ def grounded(fit: TangencyFit, rows: Sequence[Row], height: float | None) -> Pla
     level, tilt = _floor(ends)
     usual, tall = np.percentile(_above(level, ends.top), [50, STANDING])
     if height is None:
-        advice.append("the scale is the rough calibration's: state the person's --height, in metres with shoes on")
+        advice.append(NO_HEIGHT)
     elif tall > MAX_CROUCH * usual:
         advice.append(f"the scale is rough: the person bends in most of the film ({usual:.2f} m high, {tall:.2f} when upright)")
     scale = 1.0 if height is None else height / float(tall)

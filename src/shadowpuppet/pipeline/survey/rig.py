@@ -11,7 +11,7 @@ import numpy as np
 from shadowpuppet.calibration.agreement import SETS_COMPARED, Agreement, agreement
 from shadowpuppet.camera.mask import may_be_person
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
-from shadowpuppet.geometry import evenly_spread
+from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, RigLook, Survey
 from shadowpuppet.pipeline.options import Options
@@ -132,6 +132,14 @@ def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
     return look.agreement.refusal()
 
 
+def _odd(rates: Array, look: RigLook) -> str:
+    """The cameras whose rates are not the most usual one, in words."""
+    like = (np.abs(rates[:, None] - rates) <= RATES * rates).sum(1)
+    usual = rates[like.argmax()]
+    odd = [camera.name for camera, rate in zip(look.cameras, rates) if abs(rate - usual) > RATES * usual]
+    return f"camera {odd[0]!r} is" if len(odd) == 1 else f"cameras {', '.join(odd[:3])} are"
+
+
 def _rig_doubts(look: RigLook, several: bool = False, recovered: frozenset[str] = frozenset()) -> list[Caution]:
     """Doubts about a rig; of `several` people the quality of silhouettes, which supposes one, says nothing; silhouettes against an empty
     scene that was `recovered` from the films of these cameras may themselves be why the cameras do not fit together."""
@@ -144,8 +152,8 @@ def _rig_doubts(look: RigLook, several: bool = False, recovered: frozenset[str] 
         listed = ", ".join(f"{camera.name} {camera.rate:.4g}" for camera in look.cameras)
         doubts.append(Caution(f"the films have different rates (frames/s: {listed}): they are aligned by their times, {look.rate:.4g} sets "
                               "a second, and a camera without a picture of a moment is left out of it; film at one rate",
-                              "films have different rates: film at one", NOTED))
-    elif ends and max(ends.values()) - min(ends.values()) > LENGTHS:
+                              f"{_odd(rates, look)} of another frame rate: film at one", NOTED))
+    elif ends and max(ends.values()) - min(ends.values()) > LENGTHS and not any(camera.start for camera in look.cameras):
         listed = ", ".join(f"{name} {end:.2f}" for name, end in ends.items())
         doubts.append(Caution(f"the films have different lengths (s: {listed}): were they begun together? say in [start] of recording.toml "
                               "when each began", "films differ in length: begun together? see [start]", NOTED))
