@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shadowpuppet.errors import LONGEST, FormatError, ShadowPuppetWarning, extra_command, one_line, warn
+from shadowpuppet.errors import LONGEST, FormatError, ShadowPuppetWarning, did_you_mean, extra_command, one_line, warn
 from shadowpuppet.live.sources import known_person
 from shadowpuppet.pipeline.options import Options
 
@@ -33,6 +33,11 @@ def test_the_middle_of_a_long_message_is_left_out():
     assert len(line) < LONGEST + 10
     assert line.startswith("aaa")
     assert line.endswith("b")
+
+
+def test_the_nearest_name_is_offered_and_none_that_is_far():
+    assert did_you_mean("wlak", ["stand", "walk"]) == "; did you mean walk?"
+    assert did_you_mean(3, ["stand", "walk"]) == did_you_mean("fly", []) == ""
 
 
 @pytest.mark.parametrize(("found", "command"), [

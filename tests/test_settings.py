@@ -135,6 +135,7 @@ def test_names_that_settings_of_several_cameras_offer_are_those_there_are():
     ({"forces": {"iterations": -1}}, "forces.iterations: found -1"), ({"forces": {"rotation": 0}}, "forces.rotation: found 0"),
     ({"hull": {"rays": 0}}, "hull.rays: found 0"), ({"hull": 3}, "hull: found 3; input should be a dictionary"),
     ({"method": "luck"}, "method: found 'luck'; input should be 'hybrid', 'image_force' or 'particle_filter'"),
+    ({"method": "hybird"}, "input should be 'hybrid', 'image_force' or 'particle_filter'; did you mean hybrid?"),
     ({"refinement": None}, "refinement: found None; input should be 'gauss_newton' or 'forces'"),
     ({"body": "rounded"}, "body: found 'rounded'; input should be 'anatomical' or 'cylinders'"),
     ({"sigma_cost": math.nan}, "sigma_cost: found nan"), ({"velocity": 2}, "velocity: found 2"), ({"silhouettes": -1}, "silhouettes"),

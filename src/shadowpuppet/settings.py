@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
@@ -13,7 +14,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar, dataclass_transform, get
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from shadowpuppet.errors import SettingsError, choices, shown
+from shadowpuppet.errors import SettingsError, choices, did_you_mean, shown
 
 Settings = TypeVar("Settings")
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -70,7 +71,12 @@ def _settings_error(error: ValidationError, kind: Any, source: str) -> SettingsE
             kind = type(getattr(kind(), str(key)))
         return SettingsError(f"{source}: unknown setting {place!r}; there are: {choices(f.name for f in fields(kind))}")
     message = first["msg"].removeprefix("Value error, ")
-    return SettingsError(f"{source}: {place}: found {shown(first['input'])}; {message[:1].lower()}{message[1:]}")
+    return SettingsError(f"{source}: {place}: found {shown(first['input'])}; {message[:1].lower()}{message[1:]}{nearly(first)}")
+
+
+def nearly(problem: Mapping[str, Any]) -> str:
+    """The possible word that is nearly the one found, as the end of the message about a problem of pydantic's; empty if there is none."""
+    return did_you_mean(problem["input"], re.findall(r"'([^']+)'", str(problem.get("ctx", {}).get("expected", ""))))
 
 
 class Setting(NamedTuple):

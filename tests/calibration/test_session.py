@@ -102,6 +102,11 @@ def test_a_board_is_printed(tmp_path, capsys):
     assert "A3" in capsys.readouterr().out
     assert run(["calibrate", "--print-board", str(tmp_path / "b.pdf")]) == 2
     assert run(["calibrate"]) == 2
+    capsys.readouterr()
+    assert run(["calibrate", "--print-board", str(tmp_path / "c.pdf"), "--board", "checkerboard 7x5"]) == 2
+    assert "looks the same after half a turn" in (said := capsys.readouterr().err)
+    assert "take one with an odd and an even number of squares, such as 8x5, or a ChArUco board" in said
+    assert not (tmp_path / "c.pdf").exists()
 
 
 @pytest.mark.parametrize(("late", "read_again"), [(0.1, True), (0.015, False)])

@@ -313,6 +313,10 @@ def test_settings_are_a_file_of_settings(shell, recording, tmp_path):
     assert info["settings"]["tracker"]["explore"] == 20
 
 
+def test_settings_of_an_unknown_preset_print_nothing(shell):
+    assert shell("settings", "--preset", "foo")[:2] == (2, "")
+
+
 def test_every_setting_is_explained(shell):
     lines = options_text(Options()).splitlines()
     bare = [line for before, line in zip(["", *lines], lines) if re.match(r"(# )?\w+ =", line) and not before.startswith("# ")]
@@ -504,6 +508,15 @@ def test_control_c_and_the_like_leave_a_run_that_can_be_read_and_goes_on(recordi
     assert not left.complete
     assert 2 <= len(left.motion) < made.FRAMES
     assert (folder / "checkpoint.npz").exists()
+
+
+def test_what_an_interrupted_run_had_written_before_its_first_frame_was_counted_is_said(tmp_path):
+    for before in (False, True):
+        (tmp_path / "run.toml").write_text("complete = false\n" if before else "complete = true\n", encoding="utf-8")
+        with pytest.raises(KeyboardInterrupt) as stop, terminal_module.terminal(quiet=True, folder=tmp_path, resume="; --resume"):
+            (tmp_path / "run.toml").write_text("complete = false\n", encoding="utf-8")
+            raise KeyboardInterrupt
+        assert str(stop.value) == ("nothing was written" if before else f"the frames so far are in {tmp_path}; --resume")
 
 
 def test_an_earlier_run_is_replaced_only_if_asked_to(shell, recording, run, monkeypatch, tmp_path):

@@ -66,6 +66,8 @@ def test_the_look_at_several_cameras(printed):
         "background background/<camera>.mp4", "told by colour", "seen silhouettes span 1.80 m, raised hands, hair and shoes included",
         "person sizes from training; overlaps the first silhouettes by 0.91; 12 mm from body to surface points (rms)",
     ]  # fmt: skip
+    look.person = {"source": "person.toml", "residual": float("nan")}
+    assert printed(_rig_table(look))[-1] == "person sizes from person.toml"
     look.cameras[1].exact_overlap, look.person, look.agreement.height, look.frames = None, None, None, None
     found = printed(_rig_table(look))
     assert found[1] == "cameras 2, sets not counted of pictures in step, 25 a second"

@@ -378,7 +378,10 @@ def test_named_specs_are_listed_and_made(shell, tmp_path):
 
 
 @pytest.mark.parametrize(("tokens", "said"), [
-    (["--height", 3], "flags: body.stature: input should be less than or equal to 2.2, found 3"),
+    (["--height", 3], "flags: height: found 3, expected 0.9 to 2.2 metres"),
+    (["--height", 175], "flags: height: found 175, expected 0.9 to 2.2 metres (175 cm are 1.75)"),
+    (["--height", 175, "--body", "child"], "flags: height: found 175, expected 0.9 to 2.2 metres (175 cm are 1.75)"),
+    (["--motion", "wlak 3"], "found 'wlak'; did you mean walk?"),
     (["--cameras", 7, "--distance", 3], "flags: distance: found 3, which needs a camera that is in no ring (for one, --ring-radius)"),
     (["--ring-radius", 3], "flags: ring-radius: found 3, which needs several cameras (--cameras 7)"),
     (["--size", "wide"], "flags: size: found 'wide', expected width and height in pixels, such as 640x480"),

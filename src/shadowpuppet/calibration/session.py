@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from shadowpuppet.calibration.boards.board import Board, board_of
+from shadowpuppet.calibration.boards.board import Board, board_of, check_turned
 from shadowpuppet.calibration.boards.detection import View
 from shadowpuppet.calibration.boards.films import BoardFilm, films_in, read_films, view_at_rest
 from shadowpuppet.calibration.solve.lens import LensFit, lens_advice, solve_lens
@@ -177,9 +177,8 @@ def _bad_fit(fit: LensFit) -> str | None:
 def _placed(session: Session, names: Sequence[str], cameras: Sequence[Camera], carried: Mapping[str, BoardFilm],
             laid: Mapping[str, BoardFilm]) -> tuple[Placement, list[str]]:
     board, notes = session.board, list[str]()
-    if board.symmetric and len(names) > 1:
-        raise CalibrationError(f"the {board.text} looks the same after half a turn, so that two cameras cannot know which corner is "
-                               "which: take one with an odd and an even number of squares, or a ChArUco board")
+    if len(names) > 1:
+        check_turned(board)
     missing = [name for name in names if name not in carried and name not in laid]
     if missing:
         raise CalibrationError(f"{session.folder}: extrinsics/ has no film of {choices(missing)}, expected one of every camera")

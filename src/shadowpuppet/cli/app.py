@@ -46,8 +46,9 @@ def settings(*, preset: str = "default") -> None:
     """
     from shadowpuppet.pipeline.options import make_options, options_text
 
+    text = options_text(make_options({"preset": preset}))  # before anything is printed, as the preset may be unknown
     print("# Settings of `shadowpuppet track`; a setting particles in the table [tracker.arm] is the flag --tracker.arm.particles.\n")
-    print(options_text(make_options({"preset": preset})))
+    print(text)
 
 
 def completion(shell: Literal["bash", "zsh", "fish", "powershell"], /) -> None:

@@ -104,6 +104,8 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
         listener.begin("exporting")
         written = export_run(run, formats, folder, unit, missing, model, weight, rest, names)
         for of, each in runs:
+            if not each.complete:
+                listener.warn(f"the run{of} was broken off: {len(each.motion)} frames of it are exported; `track --resume` goes on with it")
             verdict = each.metrics.get("verdict", {})
             if verdict.get("word") == "bad":
                 why = "; ".join(verdict["reasons"])

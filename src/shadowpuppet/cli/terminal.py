@@ -185,7 +185,7 @@ def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "no
 
     After Ctrl-C it names `folder`, which has the frames so far, and how to `resume`, or says `nothing` before the first frame.
     """
-    listener = Terminal(quiet, verbose)
+    listener, before = Terminal(quiet, verbose), _is_broken_off(folder)
     with warnings.catch_warnings():
         warnings.simplefilter("always", ShadowPuppetWarning)
         warnings.showwarning = listener._show_warning
@@ -195,7 +195,15 @@ def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "no
         except KeyboardInterrupt as interrupt:
             if interrupt.args:
                 raise  # its message already says what was kept
-            kept = f"the {listener.frames} frames so far are in {folder}{resume}" if listener.frames and folder else nothing
+            number = f"{listener.frames} " if listener.frames else ""
+            some = folder is not None and (listener.frames or (_is_broken_off(folder) and not before))
+            kept = f"the {number}frames so far are in {folder}{resume}" if some else nothing
             raise KeyboardInterrupt(kept) from None
         finally:
             listener.stop()
+
+
+def _is_broken_off(folder: Path | None) -> bool:
+    """Whether a folder holds a run that did not come to its end."""
+    run = None if folder is None else folder / "run.toml"
+    return run is not None and run.exists() and "complete = false" in run.read_text(encoding="utf-8", errors="replace")

@@ -88,6 +88,8 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
     `ShadowPuppetError` for files that cannot be used.
     """
     how, run = how or Comparison(), read_run(folder)
+    if not run.complete:
+        warn(f"{folder}: the run was broken off after {len(run.motion)} frames, which are measured; `track --resume` goes on with it")
     table = truth if truth is not None else _known_truth(run.info.get("truth"))
     if table is None and (how.angles or how.sync or how.align):
         asked = next(name for name in ("angles", "sync", "align") if getattr(how, name))

@@ -326,13 +326,16 @@ def _check_sizes(views: Iterable[View]) -> None:
             found, (width, height) = open_frames(source).size, view.camera.size
             if found != (width, height) and not (source is not view.video and differ_by_padding(found, (width, height))):
                 raise RecordingError(f"{source}: found pictures of {found[0]} x {found[1]} pixels, the calibration of camera "
-                                     f"{view.camera.name!r} is for {width} x {height}; {_remedy(found, (width, height))}")
+                                     f"{view.camera.name!r} is for {width} x {height}; {_remedy(found, (width, height), source is view.video)}")
 
 
-def _remedy(found: tuple[int, int], expected: tuple[int, int]) -> str:
+def _remedy(found: tuple[int, int], expected: tuple[int, int], is_film: bool) -> str:
+    """What to do about pictures of another size than the calibration's: of the film itself, or of the empty scene or masks."""
     scale = found[0] / expected[0]
     if found == expected[::-1]:
         return "they are turned by a quarter: turn one of them"
+    if not is_film:
+        return "they must come from the same camera at the same setting as the film, which has that size"
     if math.isclose(scale, found[1] / expected[1], rel_tol=0.01):
         return f"they have the same shape: scale the film, or set size to {list(found)} and multiply the matrix by {scale:g}"
     return "give the film that was calibrated, or calibrate this one"

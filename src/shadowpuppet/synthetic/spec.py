@@ -12,7 +12,7 @@ from pydantic import Field, PlainValidator, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.settings import STRICT
+from shadowpuppet.settings import STRICT, nearly
 from shadowpuppet.synthetic.faults.fault import Fault
 from shadowpuppet.synthetic.furniture import Coordinate, Furniture, Obstacle
 from shadowpuppet.synthetic.movement.gestures import GESTURES
@@ -205,7 +205,7 @@ def spec_from(values: Mapping[str, Any], source: str = "spec") -> Spec:
             wanted = "a table" if first["type"] == "dataclass_type" else "a list"
             raise SettingsError(f"{source}: {place}: found {first['input']!r}, expected {wanted}") from None
         found = "" if first["type"] == "missing" else f", found {first['input']!r}"
-        raise SettingsError(f"{source}: {place}: {first['msg'][:1].lower()}{first['msg'][1:]}{found}") from None
+        raise SettingsError(f"{source}: {place}: {first['msg'][:1].lower()}{first['msg'][1:]}{found}{nearly(first)}") from None
 
 
 def spec_values(spec: Spec) -> dict[str, Any]:

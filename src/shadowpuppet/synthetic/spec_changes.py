@@ -10,13 +10,14 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from shadowpuppet.body.sizes import expected_metres, is_within
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.settings import STRICT
 from shadowpuppet.synthetic.company import RING_FOV, RING_RADIUS, RING_RADIUS_EACH, SEED, Together, members
 from shadowpuppet.synthetic.faults.fault import faults_from_text
 from shadowpuppet.synthetic.movement.resting import PostureName
 from shadowpuppet.synthetic.movement.script import SHORTEST, Gesture
-from shadowpuppet.synthetic.person.mannequin import Mannequin
+from shadowpuppet.synthetic.person.mannequin import STATURES, Mannequin
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
 from shadowpuppet.synthetic.walls import WallStyle
 
@@ -113,8 +114,9 @@ def apply_changes(changes: SpecChanges, spec: Spec, source: str = "flags") -> Sp
     if {"motion", "seconds"} & set(said):
         values["motion"] = _motion(said.get("motion"), said.get("seconds"), spec, source)
     if "height" in said:
+        if not is_within(said["height"], STATURES):
+            raise SettingsError(f"{source}: height: found {said['height']:g}, {expected_metres(said['height'], STATURES)}")
         values["body"]["stature"] = said["height"]
-        spec_from(values, source)  # the message for an impossible height states what is possible
     if "body" in said:
         kind = None if said["body"] == "random" else said["body"]
         values["body"] = asdict(Mannequin.draw(np.random.default_rng(spec.seed), kind, stature=said.get("height")))

@@ -86,6 +86,11 @@ def test_a_missing_field_is_said(tmp_path, field):
         read(tmp_path, section(without=[field]))
 
 
+def test_a_misspelt_field_is_named_with_the_missing_one(tmp_path):
+    with pytest.raises(CalibrationError, match=r"\[cam1\]: matrix: missing, expected .*translation; found matirx, which is not known$"):
+        read(tmp_path, section().replace("matrix", "matirx"))
+
+
 @pytest.mark.parametrize(("changes", "said"), [
     ({"size": '"640x480"'}, "size: found 640x480, expected 2 finite numbers"),
     ({"size": "[640]"}, "size: found [640], expected 2 finite numbers"),
@@ -104,6 +109,7 @@ def test_a_missing_field_is_said(tmp_path, field):
     ({"rotation": "[[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]"}, "rotation: found [[1.0, 0.1, 0.0]"),
     ({"rotation": "[[-1, 0, 0], [0, 1, 0], [0, 0, 1]]"}, "right-handed"),
     ({"translation": "[120.0, 960.0, 2860.0]"}, "it is probably in millimetres: say so"),
+    ({"translation": "[120.0, 96.0, 286.0]"}, "it is probably in centimetres: say so by unit = \"cm\""),
     ({"translation": "[inf, 0, 0]"}, "translation"),
     ({"fisheye": "0"}, "fisheye: found 0, expected true or false"),
     ({"name": "3"}, "name: found 3"),

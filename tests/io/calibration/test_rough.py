@@ -58,6 +58,8 @@ def test_rough_places_are_no_calibration_of_a_recording(tmp_path):
     ("toward = [0.0, 0.5, 1.0]", "toward = [2.5, -3.0, 1.4]", "[left]: toward: found [2.5, -3.0, 1.4], the place of the camera itself"),
     ("toward = [0.0, 0.5, 1.0]", "toward = [2.5, -3.0, 0]", "[left]: toward: found [2.5, -3.0, 0.0], straight below the camera"),
     ("at = [-2, 0, 1]", "at = [-2, 0]", "[right]: at: found [-2, 0], expected 3 finite numbers"),
+    ("at = [2.5", "att = [2.5", "[left]: att: no such value; possible are at, toward, fov, size; did you mean at?"),
+    ("toward", "towrad", "[left]: towrad: no such value; possible are at, toward, fov, size; did you mean toward?"),
     ("nothing", "nothing", "[right]: size: missing, expected the pictures' width and height in pixels, such as size = [1920, 1080]"),
 ])
 def test_what_cannot_be_meant_is_named(tmp_path, before, after, words):

@@ -113,18 +113,42 @@ def test_the_command_shows_what_it_did(lab, tmp_path, capsys):
     assert len(read_calibration(tmp_path / "new.toml")) == len(lab[1])
 
 
+def test_that_the_height_is_missing_is_said_before_anything_is_written(lab, tmp_path, monkeypatch, capsys):
+    def stopped(*_):
+        raise CalibrationError("stopped")
+
+    monkeypatch.setattr("shadowpuppet.pipeline.repair.placing.place_cameras", stopped)
+    for told in ([], ["--height", "1.8"]):
+        assert run(["calibrate", str(lab[0]), "--from-person", "--masks", *told]) == 2
+        assert ("warning: the scale is the rough calibration's" in capsys.readouterr().err) == (not told)
+    alone = shutil.copytree(lab[0], tmp_path / "alone")
+    (alone / "calibration.toml").unlink()
+    for film in sorted((alone / "video").iterdir())[1:]:
+        film.unlink()
+    assert run(["calibrate", str(alone), "--from-person"]) == 2
+    assert "alone: found one camera, expected two or more" in capsys.readouterr().err
+
+
 def test_a_recording_without_calibration_is_placed_from_rough_toml(lab, tmp_path, capsys):
     folder, exact = shutil.copytree(lab[0], tmp_path / "lab"), lab[1]
     (folder / "calibration.toml").unlink()
     command = ["calibrate", str(folder), "--from-person", "--masks", "--height", str(TALL)]
     assert run(command) == 2
-    assert "from a rough.toml that says where they stand" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert f"{folder / 'rough.toml'}: no such file, expected one that says where the cameras stand" in said
+    assert "such as [cam1] with the three lines at = [2.5, -3.0, 1.4], toward = [0.0, 0.0, 1.0], fov = 65" in said
+    assert f"`shadowpuppet calibrate {folder} --from-person --height METRES`" in said
     lines = []
     for camera in exact:
         ahead = camera.centre + 3 * camera.T_camera_world[2, :3] + np.array([0.1, 0, 0])
         at, toward = (", ".join(f"{value:.2f}" for value in point) for point in (camera.centre + np.array([0, 0.1, 0.05]), ahead))
         degrees = np.degrees(2 * np.arctan(camera.size[0] / 2 / camera.matrix[0, 0]))
         lines.append(f"[{camera.name}]\nat = [{at}]\ntoward = [{toward}]\nfov = {degrees:.2f}\n")
+    (folder / "rough.toml").write_text("".join(lines[:-1]))
+    assert run(command) == 2
+    said = capsys.readouterr().err
+    assert f"rough.toml: found no section of {exact[-1].name}, expected one for each film, such as [{exact[-1].name}]" in said
+    assert "--camera" not in said
     (folder / "rough.toml").write_text("".join(lines))
     assert run(command) in (0, 1)
     assert "field of view" in capsys.readouterr().out

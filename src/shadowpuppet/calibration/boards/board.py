@@ -161,6 +161,15 @@ def board_from(kind: str, square: float | None = None, **more: Any) -> Board:
     return Board(kind=name, columns=int(found[2]), rows=int(found[3]), **values, **more)  # pyright: ignore[reportArgumentType]
 
 
+def check_turned(board: Board) -> None:
+    """Raise `CalibrationError` if a board looks the same after half a turn."""
+    if board.symmetric:
+        other = board.columns + (1 if board.columns < SQUARES[1] else -1)
+        raise CalibrationError(f"the {board.text} looks the same after half a turn, so that two cameras cannot know which corner is "
+                               f"which: take one with an odd and an even number of squares, such as {other}x{board.rows}, or a ChArUco "
+                               "board")
+
+
 def read_board(path: Path) -> Board:
     """The board that a file board.toml describes. Raises `CalibrationError` with the file and the field."""
     values = read_toml(path, CalibrationError)

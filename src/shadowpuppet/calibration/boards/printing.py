@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from shadowpuppet.calibration.boards.board import Board
+from shadowpuppet.calibration.boards.board import Board, check_turned
 from shadowpuppet.errors import CalibrationError, reason
 from shadowpuppet.io.files.text import write_whole
 
@@ -21,7 +21,9 @@ RULER = 0.1
 
 
 def write_board(path: Path, board: Board) -> str:
-    """Write the board as a PDF of true size; returns the sheet's name. Raises `CalibrationError` if it cannot be written."""
+    """Write the board as a PDF of true size; returns the sheet's name. Raises `CalibrationError` if it cannot be written, or looks the same
+    after half a turn."""
+    check_turned(board)
     if path.suffix.lower() != ".pdf":
         raise CalibrationError(f"{path}: found the ending {path.suffix!r}, expected .pdf")
     name, width, height = sheet_of(board)

@@ -31,8 +31,8 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
               to: Annotated[Path | None, output("Calibration to write; LAB/calibration.toml if not given. An old one is kept "
                                                 "as calibration.before1.toml.")] = None,
               from_person: Annotated[Switch, Parameter(help="LAB is a recording of a person who walks, with a rough "
-                                                            "calibration or rough.toml: refine places by outlines, scale by the "
-                                                            "height, floor by the feet.")] = False,
+                                                            "calibration or rough.toml: refine places by outlines, scale by "
+                                                            "--height, floor by the feet.")] = False,
               height: Annotated[float | None, flag("With --from-person: the person's height in metres, with shoes on.")] = None,
               masks: Annotated[Switch, Parameter(help="With --from-person: use the recording's masks/.")] = False,
               print_board: Annotated[Path | None, flag("Write the board as a PDF of true size, and end.")] = None,

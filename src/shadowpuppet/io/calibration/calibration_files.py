@@ -23,6 +23,8 @@ UPS = {"z": (0, 0, 1), "y": (0, 1, 0), "x": (1, 0, 0), "-z": (0, 0, -1), "-y": (
 """Possible up directions in a file's world; `cameras`: the up direction in the pictures."""
 MAX_DISTANCE = 100.0
 """Greatest distance of a camera from the origin, metres; if it is greater, lengths are probably millimetres."""
+LEAST_MILLIMETRES = 1000.0
+"""From there on; if it is less, probably centimetres: rooms are some metres large."""
 SIZES = ((640, 480), (848, 480), (800, 600), (1024, 768), (1280, 720), (1280, 960), (1280, 1024), (1440, 1080), (1600, 1200), (1920, 1080),
          (1920, 1200), (2048, 1536), (2704, 1520), (2560, 1440), (3840, 2160), (4096, 2160))
 """Common picture sizes; a camera without a size gets the one nearest to twice its principal point."""
@@ -98,9 +100,10 @@ def _camera(draft: Draft, metres: float, sizes: Callable[[str], tuple[int, int] 
     T = draft.T if draft.T is not None else Camera.from_fov((2, 2), 1.0).T_camera_world
     distance = float(np.linalg.norm(T[:3, 3])) * metres
     if not distance <= MAX_DISTANCE:
+        unit, name = ("cm", "centimetres") if distance < LEAST_MILLIMETRES else ("mm", "millimetres")
         raise CalibrationError(f"translation: found {T[:3, 3].tolist()}, {distance:g} long, expected at most {MAX_DISTANCE:g} "
-                               "metres; it is probably in millimetres: say so by unit = \"mm\" in recording.toml, or write it in metres, "
-                               "with `shadowpuppet info FILE --unit mm --to NEW.toml`")
+                               f"metres; it is probably in {name}: say so by unit = \"{unit}\" in recording.toml, or write it in metres, "
+                               f"with `shadowpuppet info FILE --unit {unit} --to NEW.toml`")
     size = draft.size or (sizes(draft.name) if sizes is not None else None) or _guessed(draft, notes)
     matrix = Camera.from_fov((int(size[0]), int(size[1])), draft.fov).matrix if draft.fov is not None else np.asarray(draft.matrix)
     lens = np.ravel(np.asarray(draft.distortion, float))

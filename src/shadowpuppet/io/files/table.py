@@ -15,6 +15,9 @@ from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.text import read_text
 
+SEPARATORS = {";": "semicolons", "\t": "tabs"}
+"""Signs with which other programs separate columns."""
+
 
 @dataclass(frozen=True, eq=False)
 class Table:
@@ -127,4 +130,6 @@ def _check_columns(path: Path, columns: tuple[str, ...]) -> None:
             raise FormatError(f"{path}: column {name!r}: found it twice, expected every column once")
         seen.add(name)
     if "time" not in columns:
-        raise FormatError(f"{path}: no column 'time', expected a header time,<name>,...; found {shorten(columns)!r}")
+        other = next((name for sign, name in SEPARATORS.items() if any(sign in column for column in columns)), None)
+        what = "" if other is None else f"; found {other} between columns, expected commas (and points in numbers)"
+        raise FormatError(f"{path}: no column 'time', expected a header time,<name>,...; found {shorten(columns)!r}{what}")

@@ -111,10 +111,11 @@ def _without_places(recording: Path, error: UncalibratedError, begun: bool) -> s
     if len(cameras) == 1 and not error.known:
         return f"{recording}: found one camera, expected two or more: outlines are compared"
     command = typed("calibrate", recording, "--from-person", "--height", "METRES")
-    return (f"{file}: {'it does not say' if begun else 'no such file, which says'} where {', '.join(cameras)} stand{'s' * (len(cameras) == 1)}; "
-            f"write for each film a section such as [{cameras[0]}] with three lines: {ROUGH_EXAMPLE} (metres, z up; degrees across the "
-            f"picture; docs/calibration.md), or move films that are not to be used out of the folder; then `{command}`, with the person's "
-            "height")
+    names = ", ".join(cameras)
+    said = (f"found no section of {names}, expected one for each film" if begun else
+            f"no such file, expected one that says where the cameras stand: a section for each film ({names})")
+    return (f"{file}: {said}, such as [{cameras[0]}] with the three lines {ROUGH_EXAMPLE} (metres, z up; degrees across the picture; "
+            f"docs/calibration.md), or move films that are not to be used out of the folder; then `{command}`, with the person's height")
 
 
 

@@ -86,7 +86,7 @@ def _cautions(motion: Motion, cameras: int, blind: NDArray[np.bool_]) -> Iterato
         return
     lost, kind = lost_share(motion), min(cameras, 2)
     if lost > OFTEN_LOST:
-        short = f"person lost in {100 * lost:.0f} % of frames: run with --overlay to see"
+        short = f"person lost in {100 * lost:.0f} % of frames: look at overlay.mp4 (--overlay)"
         yield Caution(short, short, RUINOUS if lost > MOSTLY_LOST else HARMFUL)
     error = expected_error(motion, blind)
     if error > WIDE[kind]:

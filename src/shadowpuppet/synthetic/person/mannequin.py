@@ -23,6 +23,8 @@ JOINTS = ("pelvis", "neck", "head", *(f"{side}_{joint}" for side in ("left", "ri
           *(f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle")))
 """The 17 joints of a truth file, in its order."""
 
+STATURES = (0.9, 2.2)
+"""Limits of the stature, metres."""
 STATURE = (1.629, 1.756)
 """Mean stature (m) of the women and men measured by `MEASURES`."""
 
@@ -63,7 +65,7 @@ Factor = Annotated[float, Field(ge=0.7, le=1.4)]
 class Mannequin:
     """A person: stature, build, and factors on the mean measures of that stature and build."""
 
-    stature: Annotated[float, Field(ge=0.9, le=2.2)] = 1.75
+    stature: Annotated[float, Field(ge=STATURES[0], le=STATURES[1])] = 1.75
     """Height of the crown over the floor, metres."""
     build: Annotated[float, Field(ge=0, le=1)] = 1.0
     """From the mean woman's proportions (0) to the mean man's (1)."""
@@ -98,7 +100,7 @@ class Mannequin:
             if kind != "child" or not 4 <= age <= 14:
                 raise SettingsError(f"age: found {age:g} for a {kind}, expected 4 to 14 for a child")
             mean, spread = float(np.interp(age, GROWTH["age"], GROWTH["stature"])), 0.05
-        person = cls(stature=_within("stature", mean + spread * z[0] if stature is None else stature, 0.9, 2.2),
+        person = cls(stature=_within("stature", mean + spread * z[0] if stature is None else stature, *STATURES),
                      build=float(np.clip(build + 0.15 * z[1], 0, 1)), girth=float((0.9 if kind == "child" else 1.0) * (1 + 0.08 * z[2])),
                      shoulder_width=float(1 + 0.045 * z[3]), hip_width=float(1 + 0.05 * z[4]), arm_length=float(1 + 0.025 * z[5]),
                      head_size=float(1 + 0.02 * z[6]))
