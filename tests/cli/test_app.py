@@ -14,6 +14,7 @@ import sys
 import threading
 import time
 import tomllib
+from dataclasses import is_dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -27,8 +28,12 @@ from shadowpuppet.cli import app as cli
 from shadowpuppet.cli import terminal as terminal_module
 from shadowpuppet.errors import PERSON_LOST
 from shadowpuppet.io.run import read_run
+from shadowpuppet.live.settings import LiveSettings
+from shadowpuppet.live.stream.settings import OutletSettings
 from shadowpuppet.motion.metrics import UPPER_JOINTS
 from shadowpuppet.pipeline.options import Options, make_options, options_text
+from shadowpuppet.settings import settings_of
+from shadowpuppet.synthetic.spec_changes import SpecChanges
 
 QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",
          "--initialization.sweeps", "2"]
@@ -84,6 +89,20 @@ def test_help_loads_no_kernels_and_fits_a_terminal():
     assert max(map(len, done.stdout.splitlines())) <= 80
     for flag in ("--output -o", "--preset", "--seed", "--overlay", "--height", "--region", "--config", "--quiet"):
         assert flag in done.stdout
+
+
+@pytest.mark.parametrize(("command", "kind", "choices"), [
+    ("track", Options, ["off, tracker, butterworth", "camera, away"]),
+    ("live", LiveSettings, ["auto, browser"]),
+    ("play", OutletSettings, ["machine, link, site"]),
+    ("synthesize", SpecChanges, ["known, new", "standing, seated", "behind, aside", "round, past"]),
+])  # fmt: skip
+def test_help_lists_every_setting_that_is_in_no_table_with_its_choices(shell, command, kind, choices):
+    shown = " ".join(shell(command, "--help")[1].replace("│", " ").split())
+    for setting in settings_of(kind):
+        assert is_dataclass(setting.kind) or f"--{setting.name.replace('_', '-')} " in shown
+    for words in choices:
+        assert f"[choices: {words}" in shown
 
 
 def test_a_look_loads_nothing_that_only_other_commands_need():
@@ -510,12 +529,17 @@ def test_control_c_and_the_like_leave_a_run_that_can_be_read_and_goes_on(recordi
     assert (folder / "checkpoint.npz").exists()
 
 
+def interrupted_in(folder):
+    with terminal_module.terminal(quiet=True, folder=folder, resume="; --resume"):
+        (folder / "run.toml").write_text("complete = false\n", encoding="utf-8")
+        raise KeyboardInterrupt
+
+
 def test_what_an_interrupted_run_had_written_before_its_first_frame_was_counted_is_said(tmp_path):
     for before in (False, True):
         (tmp_path / "run.toml").write_text("complete = false\n" if before else "complete = true\n", encoding="utf-8")
-        with pytest.raises(KeyboardInterrupt) as stop, terminal_module.terminal(quiet=True, folder=tmp_path, resume="; --resume"):
-            (tmp_path / "run.toml").write_text("complete = false\n", encoding="utf-8")
-            raise KeyboardInterrupt
+        with pytest.raises(KeyboardInterrupt) as stop:
+            interrupted_in(tmp_path)
         assert str(stop.value) == ("nothing was written" if before else f"the frames so far are in {tmp_path}; --resume")
 
 

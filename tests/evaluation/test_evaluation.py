@@ -260,7 +260,8 @@ def test_an_axis_that_points_up_in_the_truth_alone_is_named(shell, folder, tmp_p
     assert "+Y points up in y up.csv: `shadowpuppet convert 'y up.csv' truth.csv` turns it" in err
 
 
-@pytest.mark.parametrize(("scale", "match"), [(1000, "are these millimetres?"), (100, "are these centimetres?"), (0.01, "times as large as the run's, expected metres")])
+@pytest.mark.parametrize(("scale", "match"), [(1000, "are these millimetres?"), (100, "are these centimetres?"),
+                                              (0.01, "as large as the run's, expected metres")])  # fmt: skip
 def test_a_truth_in_another_unit_is_refused(shell, folder, tmp_path, scale, match):
     write_joints(tmp_path / "far.csv", JointTable(TRUTH.times, TRUTH.names, scale * TRUTH.positions))
     code, out, err = shell(folder / "run", "far.csv", "--json")

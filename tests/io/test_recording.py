@@ -204,6 +204,14 @@ def test_a_camera_without_film_is_left_out_with_a_warning(two):
     (two / "video" / "left.mp4").unlink()
     with pytest.warns(ShadowPuppetWarning, match="no film of left; going on with right"):
         assert [v.camera.name for v in read_recording(two).views] == ["right"]
+    still(two / "video" / "left.png")
+    match = r"no film of left \(left\.png there: found a picture, expected a film\); going on with right"
+    with pytest.warns(ShadowPuppetWarning, match=match):
+        read_recording(two)
+
+
+def test_a_picture_is_no_film(tmp_path):
+    said(still(tmp_path / "me.png"), "me.png: found a picture, expected a film, or the folder with a film's pictures", fov=1.0)
 
 
 def test_two_films_of_one_camera_are_said_unless_one_is_named(one):
@@ -278,6 +286,7 @@ def test_films_may_lie_beside_their_calibration(tmp_path):
 def test_what_is_no_recording_is_said(tmp_path, one):
     said(tmp_path / "nowhere", "no such recording")
     said(tmp_path, "found neither films nor video/ nor calibration.toml nor pictures")
+
     (one / "video" / "cam.mp4").unlink()
     said(one, "no films in it, expected <camera>.mp4 or video/<camera>.mp4")
     (one / "video" / "cam.mp4").write_bytes(b"no film")
@@ -285,6 +294,11 @@ def test_what_is_no_recording_is_said(tmp_path, one):
     said(one / "calibration.toml", "calibration.toml: no ", fov=1.0, error=VideoError)
     (one / "calibration.toml").write_bytes(b"\xff")
     said(one, "no text", error=CalibrationError)
+
+def test_the_recordings_in_a_folder_that_is_none_are_named(two):
+    for n in range(4):
+        (two.parent / f"day{n}" / "video").mkdir(parents=True)
+    said(two.parent, "or a folder of pictures; recordings in it: day0, day1, day2 and 2 more")
 
 
 @pytest.mark.shared

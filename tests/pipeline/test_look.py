@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import HARMFUL, RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
+from shadowpuppet.errors import HARMFUL, NOTED, RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
+from shadowpuppet.io.recording import Subject
 from shadowpuppet.pipeline.footage import FIRST, FIRST_SECONDS, LOOKED_AT, RUN, RUNS, _spread, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import DEEP, _doubts, _forearms_seen, wrong_posture
@@ -177,6 +178,14 @@ def test_a_distance_that_only_the_silhouette_tells_is_doubted(recording, tmp_pat
     said = doubts(alone, initialization=QUICK, height=1.7)
     assert "the distance is not known: it is found from the silhouette" in said
     assert "the distance is not known" not in doubts(alone, initialization=QUICK, height=1.7, distance=2.0)
+
+
+@pytest.mark.parametrize(("calibrated", "weight"), [(True, NOTED), (False, HARMFUL)])
+def test_an_unknown_distance_before_a_camera_that_was_not_calibrated_is_no_good_film(recording, look, calibrated, weight):
+    footage = open_footage(recording, make_options({"height": 1.7}))
+    footage = replace(footage, recording=replace(footage.recording, references=(), subject=Subject(height=1.7)))
+    (doubt,) = [each for each in camera_doubts(replace(look, calibrated=calibrated), footage) if "distance" in each.short]
+    assert doubt.weight == weight
 
 
 def test_a_guessed_camera_is_said(recording, tmp_path):

@@ -203,6 +203,7 @@ def test_without_training_sizes_come_from_the_height_or_from_what_is_seen(untaug
 
 def test_the_paper_s_preset_runs(recording, shell):
     found = tracked(shell, recording, "--preset", "ni2008")
+    assert found.info["method"].startswith("Ni 2008, ")
     assert found.info["body"] == "cylinders"
     settings = found.info["settings"]["multiview"]
     assert (settings["refinement"], settings["defensive"], settings["particles"]) == ("forces", 0.0, 6)

@@ -120,8 +120,8 @@ def test_only_the_same_run_goes_on_and_a_complete_one_does_not(film, tmp_path, m
         film(folder, resume=True)
     with pytest.raises(ShadowPuppetError, match=r"cannot go on as another one: settings\.seed was 3, and is 4"):
         film(left, resume=True, seed=4)
-    with pytest.raises(ShadowPuppetError, match=r"settings\.end was not given, and is '1\.0'|settings\.end was not given, and is 1\.0"):
-        film(left, resume=True, end="1.0")
+    with pytest.raises(ShadowPuppetError, match=r"settings\.end was not given, and is '1'"):
+        film(left, resume=True, end="1")
     look, changed = module.json_text, "{}"
     monkeypatch.setattr(module, "json_text", lambda value: changed)
     with pytest.raises(ShadowPuppetError, match=r"its look\.json differs from what the recording gives now"):

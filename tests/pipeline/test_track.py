@@ -4,13 +4,14 @@ import json
 import tracemalloc
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import made
 import numpy as np
 import pytest
 
 from shadowpuppet.body.models import make_body
-from shadowpuppet.errors import SettingsError, ShadowPuppetError, ShadowPuppetWarning, SilhouetteError
+from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning, SilhouetteError
 from shadowpuppet.evaluation.interval_coverage import rank_histogram
 from shadowpuppet.geometry import align
 from shadowpuppet.io.intervals import read_intervals
@@ -21,11 +22,12 @@ from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.metrics import jitter, overlap
 from shadowpuppet.pipeline.footage import RUN, RUNS, CameraFrame, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options, plain_options, read_options
-from shadowpuppet.pipeline.prepare import fit_person, look_at
+from shadowpuppet.pipeline.prepare import MONOCULAR, MULTIVIEW, fit_person, look_at
 from shadowpuppet.pipeline.progress import StageTimer
 from shadowpuppet.pipeline.silhouette_cache import MaskStore
 from shadowpuppet.pipeline.silhouettes import learn_silhouettes, read_masks
 from shadowpuppet.pipeline.track import Listener, json_text, track_recording
+from shadowpuppet.pipeline.track import run as track_run
 from shadowpuppet.video import open_frames
 
 JOINTS = {"pelvis", "neck", "head", *(f"{side}_{joint}" for side in ("left", "right") for joint in ("shoulder", "elbow", "wrist", "hand"))}
@@ -434,3 +436,11 @@ def test_a_cutoff_that_the_rate_does_not_allow_is_refused_before_tracking(record
     with pytest.raises(SettingsError, match="cutoff: found 50 Hz"):
         track_recording(recording, tmp_path / "run", make_options({"smooth": "butterworth", "cutoff": 50}))
     assert not (tmp_path / "run" / "joints.csv").exists()
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_a_person_or_prior_that_cannot_be_read_is_refused_before_the_recording_is_examined(tmp_path, monkeypatch, several):
+    rig, kind = SimpleNamespace(is_multiview=several), MULTIVIEW if several else MONOCULAR
+    for name in ("person", "prior")[: 2 if several else 1]:
+        with pytest.raises(FormatError, match=r"gone\.\w+"):
+            track_run(rig, kind, tmp_path, make_options({name: str(tmp_path / f"gone.{'toml' if name == 'person' else 'npz'}")}), Listener())

@@ -64,7 +64,7 @@ def test_a_run_has_a_row_for_every_set_at_its_time(whole):
 def test_a_run_says_how_it_was_made(recording, whole):
     info = read_run(whole.folder).info
     assert info["recording"] == str(recording.resolve())
-    assert info["method"] == "Ni 2008, 4 cameras"
+    assert info["method"] == "after Ni 2008, 4 cameras"
     assert info["cameras"] == ["cam1", "cam2", "cam3", "cam4"]
     assert info["body"] == "anatomical"
     assert set(whole.metrics["ms_per_frame"]) == set(STAGES)

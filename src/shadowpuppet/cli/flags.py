@@ -19,9 +19,9 @@ HEADINGS = ("Run", "Person", "Cameras", "Scene", "Pictures", "Live", "Other prog
 RUN, PERSON, CAMERAS, SCENE, PICTURES, LIVE, PROGRAMS, LEARNING, OTHER = (Group(title, sort_key=n) for n, title in enumerate(HEADINGS))
 """Headings of `--help`."""
 GROUPS = {
-    **dict.fromkeys(("preset", "seed", "smooth", "cutoff", "gaps", "overlay"), RUN),
+    **dict.fromkeys(("preset", "seed", "smooth", "cutoff", "gaps", "overlay", "anyway"), RUN),
     **dict.fromkeys(("height", "distance", "facing", "body", "person", "prior", "appearance"), PERSON),
-    **dict.fromkeys(("rate", "speed", "countdown", "learn", "still", "show", "listen", "port", "record"), LIVE),
+    **dict.fromkeys(("rate", "delay", "speed", "countdown", "learn", "still", "show", "listen", "port", "lag", "record"), LIVE),
     **dict.fromkeys(("osc", "websocket", "origin", "lsl", "lsl_scope"), PROGRAMS),
     **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "start", "end", "max_size", "every"),
                     PICTURES),
@@ -104,7 +104,7 @@ def _bare(hint: Any) -> Any:
 def _parameter(setting: Setting, visible: bool, groups: Mapping[str, Group]) -> Parameter:
     default = setting.default
     end = "" if default is None or isinstance(default, bool) else f" [default: {default}]"
-    return Parameter(help=setting.help + end, show=visible, group=groups.get(setting.name), show_choices=setting.name in ("body", "show"))
+    return Parameter(help=setting.help + end, show=visible, group=groups.get(setting.name, OTHER))
 
 
 if TYPE_CHECKING:

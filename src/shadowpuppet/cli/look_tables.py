@@ -108,5 +108,6 @@ def _pixels(camera: CameraLook) -> str:
 def _rig_person(person: Mapping[str, Any]) -> str:
     parts = [f"sizes from {person['source']}"] if "source" in person else []
     parts += [f"overlaps the first silhouettes by {person['overlap']:.2f}"] if "overlap" in person else []
-    parts += [f"{1000 * person['residual']:.0f} mm from body to surface points (rms)"] if np.isfinite(person.get("residual") or np.nan) else []
+    residual = person.get("residual")
+    parts += [f"{1000 * residual:.0f} mm from body to surface points (rms)"] if residual is not None and np.isfinite(residual) else []
     return "; ".join(parts) or "measured"

@@ -126,7 +126,7 @@ def convert(source: Annotated[Path, Parameter(help=f"File of motion: {choices(RE
             quiet: Quiet = False) -> None:  # fmt: skip
     """Convert a file of motion into another format: joints in metres, Z up, or as the other format requires.
 
-    A skeleton (.bvh, .amc) stays one in .bvh and .glb; a body is fitted to joints alone if the target needs one.
+    A skeleton (.bvh, .amc) stays one in .bvh, .glb and .usda; a body is fitted to joints alone if the target needs one.
 
     Parameters
     ----------

@@ -121,9 +121,12 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
         return _read_folder(project.folder if project else folder, fov, calibration, project, asked)
     if folder.is_dir() and not any(p.suffix.lower() in IMAGE_SUFFIXES for p in folder.iterdir()):
         raise RecordingError(f"{folder}: found neither films nor video/ nor calibration.toml nor pictures in it, expected a "
-                             "recording (<camera>.mp4 or video/<camera>.mp4, and calibration.toml) or a folder of pictures")
+                             "recording (<camera>.mp4 or video/<camera>.mp4, and calibration.toml) or a folder of pictures"
+                             + _within(folder))
     source = folder if camera_number(path) is None else path
     if source is folder:
+        if folder.is_file() and folder.suffix.lower() in IMAGE_SUFFIXES:
+            raise RecordingError(f"{folder}: found a picture, expected a film, or the folder with a film's pictures")
         open_frames(folder)  # raises for a file that is no film, before the calibration is read
     cameras = _cameras(folder, {folder.stem: source}, fov, calibration)
     named = [c for c in cameras if c.name == folder.stem or len(cameras) == 1]
@@ -143,6 +146,13 @@ def _like(path: Path) -> str:
         return ""
     found = get_close_matches(path.name, there, 1)
     return f"; did you mean {path.parent / found[0]}?" if found else ""
+
+
+def _within(folder: Path) -> str:
+    """The recordings in a folder, in words; empty without one."""
+    found = sorted(each.name for each in folder.iterdir() if each.is_dir() and is_recording(each))
+    more = f" and {len(found) - 3} more" if len(found) > 3 else ""
+    return f"; recordings in it: {', '.join(found[:3])}{more}" if found else ""
 
 
 def _is_own(folder: Path) -> bool:
@@ -187,7 +197,9 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
         _check_names(folder / kind if (folder / kind).is_dir() else folder, sources, cameras, asked, kind)
     missing = [c.name for c in cameras if c.name not in films]
     if missing:
-        warn(f"{folder}: no film of {choices(missing)}; going on with {choices(films)}")
+        pictures = [path.name for name in missing for path in sources_in(folder / "video", IMAGE_SUFFIXES).get(name, ())]
+        instead = f" ({choices(pictures)} there: found a picture, expected a film)" if pictures else ""
+        warn(f"{folder}: no film of {choices(missing)}{instead}; going on with {choices(films)}")
     starts = _starts(notes, cameras, asked)
     views = tuple(_without_padding(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), starts.get(c.name, 0.0)))
                   for c in cameras if c.name in films)
@@ -326,7 +338,8 @@ def _check_sizes(views: Iterable[View]) -> None:
             found, (width, height) = open_frames(source).size, view.camera.size
             if found != (width, height) and not (source is not view.video and differ_by_padding(found, (width, height))):
                 raise RecordingError(f"{source}: found pictures of {found[0]} x {found[1]} pixels, the calibration of camera "
-                                     f"{view.camera.name!r} is for {width} x {height}; {_remedy(found, (width, height), source is view.video)}")
+                                     f"{view.camera.name!r} is for {width} x {height}; "
+                                     + _remedy(found, (width, height), source is view.video))
 
 
 def _remedy(found: tuple[int, int], expected: tuple[int, int], is_film: bool) -> str:

@@ -73,26 +73,27 @@ class Options:
     height: Annotated[float, Field(ge=HEIGHTS[0], le=HEIGHTS[1]), _metres(HEIGHTS)] | None = None
     """Height of the person with shoes, metres. Overrides recording.toml."""
     distance: Annotated[float, Field(ge=DISTANCES[0], le=DISTANCES[1]), _metres(DISTANCES)] | None = None
-    """Distance from the camera to the middle of the body at the start, metres. Overrides recording.toml."""
+    """Distance from the camera to the middle of the body at the start, metres; one camera only. Overrides recording.toml."""
     body: BodyName | None = None
-    """Body model in place of the tracker's own: upper body (the first three) or whole body."""
+    """Body model in place of the tracker's own: an upper body (cardbox, cardbox_bends, boxes or rounded; one camera only) or a whole body
+    (anatomical or cylinders). By default rounded with one camera, anatomical with several, the paper's with the preset of a paper."""
     person: Path | None = None
     """Sizes of the person, saved by an earlier run or by `fit-person` (person.toml)."""
     prior: Path | None = None
     """Motion prior saved by `fit-prior` (.npz), for several cameras. By default it is learnt from the recording's training motion, if there
     is any."""
     fov: Annotated[float, Field(gt=0, lt=180)] | None = None
-    """Horizontal field of view, degrees, of a camera without calibration."""
+    """Horizontal field of view, degrees, of a camera without calibration; one camera only."""
     calibration: Path | None = None
     """Calibration file in place of the recording's own."""
     camera: str | None = None
     """Name of the one camera to track with, if the recording has several; or several names, separated by commas."""
     background: Path | None = None
-    """Picture or film of the empty scene in place of the recording's own."""
+    """Picture or film of the empty scene in place of the recording's own; one camera only."""
     masks: bool = False
     """Use the recording's ready silhouettes (masks/) instead of segmenting the film."""
     region: Annotated[tuple[int, int, int, int], BeforeValidator(_corners)] | None = None
-    """Region of interest x0,y0,x1,y1, pixels of the film; everything outside is background."""
+    """Region of interest x0,y0,x1,y1, pixels of the film; everything outside is background. One camera only."""
     start: Annotated[str, BeforeValidator(moment_text)] | None = None
     """Where to begin, on the recording's clock: 3.5 (seconds) or 120f (frames). Times in the results stay the recording's."""
     end: Annotated[str, BeforeValidator(moment_text)] | None = None
@@ -109,8 +110,8 @@ class Options:
     """Smoothing of the tracked motion over time, when the film is over: tracker (by the doubt of every frame, with people's accelerations),
     butterworth (a low-pass filter, fourth order, without lag), off. By default tracker, and off with the papers' presets."""
     facing: Literal["camera", "away"] = "camera"
-    """Whether the person faces the camera in the first frame, or looks away from it: one camera's silhouettes do not tell. With several
-    cameras it has no effect; nor has it with `smooth = "off"`."""
+    """Where the person looks in the first frame: to the camera, or away from it, which one camera's silhouettes do not tell. One camera
+    only; no effect with `smooth = "off"`."""
     cutoff: Annotated[float, Field(gt=0, le=1000)] = 6.0
     """Cut-off frequency of the Butterworth filter, Hz."""
     gaps: Annotated[float, Field(ge=0, le=10)] | None = None
@@ -176,8 +177,9 @@ def check_used(options: Options, several: bool) -> None:
     presets, cameras = (MULTIVIEW_PRESETS, "several cameras") if several else (PRESETS, "one camera")
     if options.preset not in presets:
         instead = ", or one camera (--camera)" if several else ""
-        raise SettingsError(f"preset: found {options.preset!r}, a method for {'one camera' if several else 'several cameras'}; expected with "
-                            f"{cameras} one of {choices(presets)}{instead}")
+        other = "one camera" if several else "several cameras"
+        raise SettingsError(f"preset: found {options.preset!r}, a method for {other}; expected with {cameras} one of {choices(presets)}"
+                            f"{instead}")
     given = {name: getattr(options, name) for name in ("preset", "body") if getattr(options, name) is not None}
     usual, now = plain_values(make_options(given)), plain_values(options)
     idle = [name for key in (OF_ONE if several else OF_SEVERAL) for name in _changed(key, usual[key], now[key])]

@@ -32,7 +32,7 @@ class Kind(NamedTuple):
     """How a recording is surveyed, fitted and tracked: with one camera or with several."""
 
     method: str
-    """Name of the method; {} stands for the number of cameras."""
+    """Source of the method; {} stands for the number of cameras."""
     settings: str
     """Name of the field of `Options` with the tracker's settings."""
     survey: Callable[..., Survey]
@@ -43,6 +43,10 @@ class Kind(NamedTuple):
     """Whether `look_at` also measures the person; not with several cameras, which takes long."""
     stages: tuple[str, ...]
     """Stages whose times are written to metrics.json."""
+
+    def name(self, preset: str, cameras: int) -> str:
+        """The method's name: the paper's own only with the paper's settings."""
+        return f"{'after ' if preset == 'default' else ''}{self.method.format(cameras)}"
 
 
 MONOCULAR = Kind("Liu 2011, one camera", "tracker", survey_camera, fit_monocular, True, ("decode", "segment", "track", "doubt", "write"))

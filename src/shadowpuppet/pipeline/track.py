@@ -14,6 +14,8 @@ import numpy as np
 
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError, warn
 from shadowpuppet.io.people import person_folder
+from shadowpuppet.io.person import read_person
+from shadowpuppet.io.prior import read_prior
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter, write_metrics
 from shadowpuppet.motion.motion import BLANK, Motion, MotionBuilder, MotionFrame
@@ -21,7 +23,7 @@ from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options, check_used, plain_options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
-from shadowpuppet.pipeline.prepare import Kind, Prepared, fit_survey, kind_of, look_around
+from shadowpuppet.pipeline.prepare import MULTIVIEW, Kind, Prepared, fit_survey, kind_of, look_around
 from shadowpuppet.pipeline.progress import (
     FALLBACK_RATE,
     Checkpoints,
@@ -80,8 +82,9 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
     """Survey, fit, track and evaluate; see `track_recording`."""
     for_look, for_track = generators(options)
     check_used(options, rig.is_multiview)
+    _check_files(options, kind)
     body, recording = average_body(getattr(options, kind.settings).body), rig.recording
-    info = {"recording": recording.path.resolve(), "method": kind.method.format(len(rig.cameras)),
+    info = {"recording": recording.path.resolve(), "method": kind.name(options.preset, len(rig.cameras)),
             "cameras": list(rig.names) if rig.is_multiview else None, "settings": plain_options(options),
             "truth": recording.truth and recording.truth.resolve(), "begin": recording.begin or None, "end": recording.duration}
     with RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, resume) as writer:
@@ -108,6 +111,14 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
     warn_of_set_aside(metrics.get("set_aside", []))
     write_metrics(folder, metrics)
     return Summary(Path(folder), written.motion, metrics, prepared.look)
+
+
+def _check_files(options: Options, kind: Kind) -> None:
+    """Raise `FormatError` for a person or a prior that cannot be read, before the recording is examined."""
+    if options.person is not None:
+        read_person(options.person, getattr(options, kind.settings).body)
+    if options.prior is not None and kind is MULTIVIEW:
+        read_prior(options.prior)
 
 
 def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: Listener,

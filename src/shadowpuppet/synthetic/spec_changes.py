@@ -42,11 +42,11 @@ class SpecChanges:
     seconds: Annotated[float, Field(ge=2, le=3600)] | None = None
     """Length of the motion; the film has 0.8 s of standing before and after it."""
     posture: PostureName | None = None
-    """Posture from the first frame to the last: standing, seated, kneeling or lying."""
+    """Posture from the first frame to the last."""
     chair: Literal["known", "new"] | None = None
     """Chair on which the person sits: known is in the film of the empty scene too, new is not."""
     body: Literal["woman", "man", "child", "random"] | None = None
-    """Kind of person: woman, man, child or random; drawn by the seed from published proportions."""
+    """Kind of person; drawn by the seed from published proportions."""
     height: float | None = None
     """Height of the person, metres."""
     cameras: Annotated[int, Field(ge=1, le=64)] | None = None
@@ -66,7 +66,7 @@ class SpecChanges:
     rate: float | None = None
     """Frames per second."""
     background: WallStyle | None = None
-    """Walls and floor: room, plain, cluttered or textured."""
+    """Walls and floor."""
     room: int | None = None
     """Seed of wall, floor and lamps."""
     clothing: int | None = None
@@ -84,7 +84,7 @@ class SpecChanges:
     crf: int | None = None
     """Compression of the films, H.264's crf: 0 the best, 18 the default, 51 the worst."""
     occluder: Literal["table", "chair", "pillar", "cabinet"] | None = None
-    """Obstacle between the person and the first camera: table, chair, pillar or cabinet."""
+    """Obstacle between the person and the first camera."""
     empty_seconds: float | None = None
     """Length of the film of the empty scene, seconds; 0: there is none."""
     second_person: Literal["behind", "aside", "passing"] | None = None
@@ -92,8 +92,7 @@ class SpecChanges:
     people: Annotated[int, Field(ge=2, le=6)] | None = None
     """Number of people, 2 to 6, each with a body, clothes, motion and truth of their own."""
     together: Together | None = None
-    """What they do: walk round each other, walk past each other, dance on the spot, or shake_hands; two people if --people does not say
-    how many."""
+    """What they do: walk round or past each other, dance on the spot, or shake hands; two people if --people does not say how many."""
     faults: str | None = None
     """Faults of the pictures: kind, amount, @begin-end in seconds, drift, cameras, such as "gain 1.3 @3-6, nudge 20 @4 cam2, black @5"; all
     but the kind may be left out."""

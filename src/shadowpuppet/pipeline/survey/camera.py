@@ -114,7 +114,7 @@ def _doubts(look: Look, footage: Footage) -> list[Caution]:
     elif subject.distance is None and not footage.recording.references:
         doubts.append(Caution("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as "
                               "wrong as that; measure it and give --distance, or take references",
-                              "distance not known: measure it, give --distance", NOTED))
+                              "distance not known: measure it, give --distance", NOTED if look.calibrated else HARMFUL))
     if look.frames is not None and look.frames < SHORT * look.rate:
         seconds = f"{look.frames / look.rate:.1f} s"
         doubts.append(Caution(f"the film has only {look.frames} frames ({seconds}): too few to measure the person well and to smooth the "
