@@ -131,6 +131,7 @@ def test_the_version_is_reported_by_the_module_too():
     (["track"], "requires an argument"),
     (["track", "here", "--overlya"], "Unknown option: --overlya. Did you mean --overlay"),
     (["track", "here", "--tracker.arm.particle", "3"], "Did you mean --tracker.arm.particles"),
+    (["track", "here", "--height", "1,75"], '--height: unable to convert "1,75" into float. Write 1.75.'),
     (["track", "here", "--tracker.arm.particles", "many"], '--tracker.arm.particles: unable to convert "many" into int'),
     (["track", "here", "--tracker.arm.particles", "1"], "tracker: arm.particles: found 1; "),
     (["track", "here", "--preset", "liu"], "unknown preset 'liu'; there are: default, liu2011"),
@@ -363,6 +364,7 @@ def test_a_run_can_be_made_again_from_its_own_file(shell, recording, run, tmp_pa
 
 
 @pytest.mark.parametrize(("text", "said"), [
+    ("[case.fast]\nseed = 3", "mine.toml: found a file for `shadowpuppet batch`, expected settings of one run"),
     ("particles = 3", "mine.toml: unknown setting 'particles'; there are: anyway, appearance, background, body"),
     ("[tracker]\narms = 3", "mine.toml: tracker: unknown setting 'arms'; there are: arm, arm_colours, body"),
     ("[tracker.arm]\nparticles = -3", "mine.toml: tracker: arm.particles: found -3"),

@@ -66,10 +66,15 @@ def test_of_a_part_of_a_recording_the_truth_of_that_part_is_compared(tmp_path):
     assert (broken["frames"], broken["lost"]) == (len(times), len(times) - 3)
 
 
-@pytest.mark.parametrize(("start", "end", "frames"), [("2", "4", (2, 4)), ("2f", "4f", (2, 4)), (2, None, (2, 179))])
+@pytest.mark.parametrize(("start", "end", "frames"), [("2", "64", (2, 64)), ("2f", "4f", (2, 4)), (2, None, (2, 179))])
 def test_the_truth_s_frames_are_chosen_by_number(folder, start, end, frames):
     errors = evaluate_run(folder / "run", start=start, end=end)
     assert errors["clock"]["frames_compared"] == frames[1] - frames[0] + 1
+
+
+def test_a_few_frames_given_by_bare_numbers_may_have_been_meant_in_seconds(folder):
+    with pytest.warns(ShadowPuppetWarning, match=r"start 1 and end 2 are frames of \S+, 2 in all; seconds are written 1\.0 and 2\.0"):
+        evaluate_run(folder / "run", start="1", end="2")
 
 
 def test_the_truth_s_frames_are_chosen_by_time(folder):

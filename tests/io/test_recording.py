@@ -348,6 +348,21 @@ def test_a_misspelt_name_is_answered_with_the_one_that_is_there(tmp_path):
         read_recording(tmp_path / "other.mov")
 
 
+def test_what_several_cameras_need_is_said_with_commands_that_can_be_pasted(tmp_path):
+    lab = tmp_path / "my lab"
+    (lab / "extrinsics").mkdir(parents=True)
+    write_calibration(lab / "calibration.toml", cameras("a", "b"))
+    with pytest.raises(RecordingError, match=r"no films in it, .*; those in extrinsics/ are of a board: put the person's into video/$"):
+        read_recording(lab)
+    (lab / "calibration.toml").unlink()
+    for name in ("a", "b"):
+        film(lab / f"{name}.mp4")
+    with pytest.raises(RecordingError) as caught:
+        read_recording(lab)
+    for words in ("(`shadowpuppet calibrate '{}'`, docs", "(`shadowpuppet calibrate '{}' --from-person --height METRES`)"):
+        assert words.format(lab) in str(caught.value)
+
+
 def test_a_film_that_the_calibration_does_not_know_may_be_left_out(tmp_path):
     lab = tmp_path / "lab"
     lab.mkdir()

@@ -341,7 +341,7 @@ def without_last_line(path: Path) -> None:
 
 def test_a_recording_is_reported_from_a_run(tmp_path):
     (tmp_path / "the lab" / "video").mkdir(parents=True)
-    with pytest.raises(FormatError, match=r"lab: found no run\.toml in it, .* a recording: track it first \(`shadowpuppet track '.*lab'`\)"):
+    with pytest.raises(FormatError, match=r"lab: found no run\.toml in it, .* recording: track it first \(`shadowpuppet track '.*lab'`\)"):
         read_run(tmp_path / "the lab")
 
 

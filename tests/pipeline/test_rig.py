@@ -337,7 +337,7 @@ def test_one_camera_that_breaks_off_is_an_error(tmp_path):
 
 
 @pytest.mark.parametrize(("options", "message"), [
-    ({"region": (0, 0, 8, 8)}, "region: found one for 3 cameras"),
+    ({"region": (0, 0, 8, 8)}, "region: found a region for 3 cameras"),
     ({"background": Path("x.png")}, r"background: found one for 3 cameras, expected one each, background/<camera>"),
 ])
 def test_what_serves_one_camera_is_refused_for_several(tmp_path, options, message):

@@ -22,9 +22,8 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.text import read_toml
+from shadowpuppet.io.recording import BOARD_FOLDERS
 
-FOLDERS = ("intrinsics", "extrinsics", "floor")
-"""Folders of a session's films."""
 MAX_RMS = 1.0
 """Greatest reprojection error, pixels of a picture 1000 wide, that is not remarked on."""
 MAX_PLACE_SD, MAX_ANGLE_SD = 0.005, np.radians(0.1)
@@ -46,7 +45,7 @@ class Session:
     folder: Path
     board: Board
     films: Mapping[str, Mapping[str, Path]]
-    """Films by folder, of `FOLDERS`, and camera."""
+    """Films by folder, of `BOARD_FOLDERS`, and camera."""
     starts: Mapping[str, float]
     """Seconds of each film of extrinsics/ before the session begins."""
 
@@ -76,7 +75,7 @@ class Calibrated:
 def open_session(folder: Path, board: Board | None = None) -> Session:
     """The session in a folder; `board` replaces board.toml. Raises `CalibrationError` if there is no board or no films."""
     if not folder.is_dir():
-        raise CalibrationError(f"{folder}: expected a folder with {', '.join(f'{name}/' for name in FOLDERS)} and board.toml")
+        raise CalibrationError(f"{folder}: expected a folder with {', '.join(f'{name}/' for name in BOARD_FOLDERS)} and board.toml")
     values: dict[str, Any] = {}
     path = folder / "board.toml"
     if path.exists():
@@ -85,11 +84,11 @@ def open_session(folder: Path, board: Board | None = None) -> Session:
         raise CalibrationError(f"{folder}: board.toml is missing, which describes the board (kind, columns, rows, square); or say "
                                "--board 'charuco 7x5' --square 0.04")
     starts = _starts(values.pop("start", {}), path)
-    films = {name: films_in(folder / name) for name in FOLDERS}
+    films = {name: films_in(folder / name) for name in BOARD_FOLDERS}
     session = Session(folder=folder, board=board or board_of(values, path), films=films, starts=starts)
     if not session.names:
-        raise CalibrationError(f"{folder}: found no films in {', '.join(f'{name}/' for name in FOLDERS)}; expected a film a camera, named "
-                               "after it: intrinsics/cam1.mp4")
+        raise CalibrationError(f"{folder}: found no films in {', '.join(f'{name}/' for name in BOARD_FOLDERS)}; expected a film a camera, "
+                               "named after it: intrinsics/cam1.mp4")
     for name in starts:
         if name not in session.names:
             raise CalibrationError(f"{path}: start: found {name!r}, there are films of {choices(session.names)}")

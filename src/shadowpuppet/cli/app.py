@@ -94,4 +94,5 @@ def _told(error: Exception) -> str:
     if isinstance(error, UnusedCliTokensError):
         words = error.unused_tokens or ()
         return one_line(f"found {' '.join(words)!r} after all that the command takes; a path with blanks belongs in quotes")
-    return one_line(error)
+    comma = re.search(r'unable to convert "(-?\d+),(\d+)" into float', str(error))
+    return one_line(error) + (f" Write {comma[1]}.{comma[2]}." if comma else "")

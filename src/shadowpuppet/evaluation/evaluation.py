@@ -41,6 +41,8 @@ from shadowpuppet.motion.motion import ROUNDING, JointTable
 from shadowpuppet.motion.synchronization import at_common_times, at_times, find_offset, step_of
 from shadowpuppet.video.moments import read_moment
 
+BRIEF = 0.5
+"""Span (s) below which one that was given by whole numbers, which are frames, may have been meant in seconds."""
 OTHER_UNIT = 10.0
 """Ratio of the sizes of the truth's person and the run's from which one of them is in another unit."""
 
@@ -173,6 +175,9 @@ def _cut(truth: JointTable, how: Comparison, path: str | Path) -> JointTable:
         raise ShadowPuppetError(f"start: found {how.start}, expected 0 to {last}, a frame of {path}")
     if not start <= end <= last:
         raise ShadowPuppetError(f"end: found {how.end}, expected {start} to {last}, a frame of {path}")
+    typed = [each for each in (how.start, how.end) if isinstance(each, str) and each.isdigit()]
+    if len(typed) == 2 and truth.times[end] - truth.times[start] < BRIEF:
+        warn(f"start {start} and end {end} are frames of {path}, {end - start + 1} in all; seconds are written {start}.0 and {end}.0")
     frames = slice(start, end + 1)
     return JointTable(truth.times[frames], truth.names, truth.positions[frames])
 

@@ -21,6 +21,8 @@ from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES, camera_number, ope
 
 POSTURES = ("front_t_pose", "side_arms_hanging", "front_arms_t_pose")
 """Reference postures of Liu 2011's initialisation, for O1, O2 and O3 (IV-A)."""
+BOARD_FOLDERS = ("intrinsics", "extrinsics", "floor")
+"""Folders of films of a board, from which cameras are calibrated."""
 RATES = (0.1, 10_000.0)
 """Limits of `rate`, frames/s."""
 BLOCK, MAX_PADDING = 16, 0.05
@@ -185,8 +187,10 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
     if project is not None:
         films = films or project.films
     if not films:
+        boards = [f"{name}/" for name in BOARD_FOLDERS if (folder / name).is_dir()]
+        hint = f"; those in {choices(boards)} are of a board: put the person's into video/" if boards else ""
         raise RecordingError(f"{folder}: no films in it, expected <camera>.mp4 or video/<camera>.mp4, a folder of pictures "
-                             "video/<camera>/, or a [video] table in recording.toml")
+                             f"video/<camera>/, or a [video] table in recording.toml{hint}")
     calibration = calibration or notes.file("calibration") or (project.calibration if project else find_calibration(folder))
     if project is not None and calibration is None and fov is None:
         raise RecordingError(f"{folder}: {project.no_calibration}")
@@ -278,10 +282,11 @@ def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration
         told = {key: notes.choice(key, known) for key, known in (("unit", UNITS), ("up", UPS))} if notes else {}
         return read_calibration(calibration, sizes=size, **told)
     if len(films) > 1:
-        by_board, by_person = typed("calibrate", "BOARD_FOLDER"), typed("calibrate", folder, "--from-person", "--height", "METRES")
+        by_board, by_person = (typed("calibrate", folder, *more) for more in ((), ("--from-person", "--height", "METRES")))
         raise UncalibratedError(f"{folder}: no calibration.toml for its {len(films)} cameras ({choices(films)}); several cameras must be "
-                                f"calibrated together: by films of a printed board in another folder (`{by_board}`, docs/calibration.md), "
-                                f"or by the person who walks there, from a rough.toml that says where they stand (`{by_person}`)", films)
+                                f"calibrated together: by films of a printed board, put into its intrinsics/ and extrinsics/ "
+                                f"(`{by_board}`, docs/calibration.md), or by the person who walks there, from a rough.toml that says where "
+                                f"they stand (`{by_person}`)", films)
     if fov is None:
         raise UncalibratedError(f"{folder}: no calibration: give the camera's horizontal field of view (--fov DEGREES, option fov; a "
                                 "phone held across has about 65, held upright 40, a webcam 60) or a calibration.toml", films)

@@ -146,7 +146,7 @@ def open_rig(path: str | Path, options: Options) -> Rig:
     if options.background is not None and len(views) > 1:
         raise SettingsError(f"background: found one for {len(views)} cameras, expected one each, background/<camera>.* in the recording")
     if options.region is not None and len(views) > 1:
-        raise SettingsError(f"region: found one for {len(views)} cameras, expected none: it serves a single camera")
+        raise SettingsError(f"region: found a region for {len(views)} cameras, expected it with one camera only (--camera)")
     return Rig(recording, tuple(camera_footage(recording, view, options) for view in views))
 
 

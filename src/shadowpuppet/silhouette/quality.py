@@ -117,13 +117,13 @@ class MaskQuality:
                           HARMFUL)
         if self.flicker > WARN_FLICKER:
             yield Caution(f"pixels worth {_percent(self.flicker)} of the person's area flicker from frame to frame: noise in dim light, "
-                          "a lamp's flicker, or silhouettes that are not cleaned; use more light, or the setting clean",
+                          "a lamp's flicker, or silhouettes that are not cleaned; use more light, or --silhouette.clean",
                           "outlines flicker: use more light", HARMFUL)
 
     def _unclean(self) -> Iterator[Caution]:
         if self.speck_area > WARN_SPECK_AREA:
             yield Caution(f"the silhouette has {self.specks:.1f} parts beside the person, {_percent(self.speck_area)} of its area: "
-                          "noise, shadow or another person; use the setting clean, or keep others out of the picture",
+                          "noise, shadow or another person; use --silhouette.clean, or keep others out of the picture",
                           "noise, shadows or others beside the person: keep them out", HARMFUL)
         if self.hole_area > WARN_HOLE_AREA or self.holes > WARN_HOLES:
             yield Caution(f"the silhouette has {self.holes:.1f} holes, {_percent(self.hole_area)} of its area: clothes like the "
