@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import ClassVar
 
 import made
@@ -14,19 +15,20 @@ import numpy as np
 import pytest
 
 from shadowpuppet.calibration.agreement import SETS_COMPARED
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.cli.app import run
 from shadowpuppet.errors import HARMFUL, NOTED, TrackingError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.pipeline.footage import RUN, RUN_OF_SEVERAL, RUNS, RUNS_OF_SEVERAL, take_sample
-from shadowpuppet.pipeline.look import RigLook
+from shadowpuppet.pipeline.look import FirstSeconds, RigLook
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.prepare import MULTIVIEW, look_at, prepare
 from shadowpuppet.pipeline.progress import Listener, Steps, json_text
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.survey.opening import opening_of
-from shadowpuppet.pipeline.survey.rig import _rig_doubts, survey_rig
+from shadowpuppet.pipeline.survey.rig import _agreement_of_one, _rig_doubts, survey_rig
 from shadowpuppet.pipeline.track import track_recording
 
 MASKS = Options(masks=True)
@@ -281,3 +283,14 @@ def test_a_cable_before_one_camera_accuses_none(recording, tmp_path):
     assert look.agreement.wrong == ()
     assert [camera.name for camera in look.cameras if camera.left_out] == [name]
     assert any(doubt.startswith(f"camera {name!r}: a thin upright line at x = 31") for doubt in look.doubts)
+
+
+def test_a_camera_that_shows_a_part_of_the_person_at_first_is_not_to_blame():
+    cameras = made_rig.cameras()
+    whole = made_rig.masks(cameras, SETS_COMPARED)
+    cut_off = [[*row[:1], row[1] & (np.arange(len(row[1]))[:, None] < len(row[1]) // 2), *row[2:]] for row in whole]
+    rig, first = SimpleNamespace(cameras=cameras), FirstSeconds([0.1 * n for n in range(len(whole))], list(map(tuple, cut_off)))
+    wrong = (cameras[1].name,)
+    assert _agreement_of_one(rig, first).wrong == wrong
+    assert _agreement_of_one(rig, first, [Seen(tuple(row)) for row in whole]).wrong == ()
+    assert _agreement_of_one(rig, first, [Seen(tuple(row)) for row in cut_off]).wrong == wrong

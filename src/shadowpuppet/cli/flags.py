@@ -103,7 +103,7 @@ def _bare(hint: Any) -> Any:
 
 def _parameter(setting: Setting, visible: bool, groups: Mapping[str, Group]) -> Parameter:
     default = setting.default
-    end = "" if default is None or isinstance(default, bool) else f" [default: {default}]"
+    end = "" if default in (None, ()) or isinstance(default, bool) else f" [default: {default}]"
     return Parameter(help=setting.help + end, show=visible, group=groups.get(setting.name, OTHER))
 
 

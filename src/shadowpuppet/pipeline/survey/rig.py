@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from shadowpuppet.calibration.agreement import SETS_COMPARED, Agreement, agreement
-from shadowpuppet.camera.mask import may_be_person
+from shadowpuppet.camera.mask import Seen, may_be_person
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.pipeline.footage import Footage
@@ -48,13 +48,13 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     with ThreadPoolExecutor(usable_cores(), "look") as pool:
         films = list(pool.map(surveyed, rig.footage, hints or [SceneHint()] * len(rig.footage)))
     silhouettes = tuple(film.silhouettes for film in films)
-    census, wide = None, tuple(each.of_several() for each in silhouettes)
+    census, spread, wide = None, list[Seen](), tuple(each.of_several() for each in silhouettes)
     if any(_shows_person(film) for film in films):
         steps("counting people in all films")
         seen = max((film.sample.times[-1] for film in films if len(film.sample.times)), default=0.0)
         share = SharedShadows(rig.cameras)
-        census = take_census(rig.cameras, sampled_sets([film.sample for film in films], wide, share),
-                             later_sets(rig, wide, float(seen), share))
+        sampled, later = sampled_sets([film.sample for film in films], wide, share), later_sets(rig, wide, float(seen), share)
+        census, spread = take_census(rig.cameras, sampled, later), [*sampled, *later]
     several = census.number if census is not None and census.number > 1 else 0
     if several:
         films = [of_several(film) for film in films]
@@ -62,7 +62,7 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     steps("silhouettes of the first seconds in all films")
     first = first_seconds(rig, silhouettes, [film.sample for film in films], opening, options.masks)
     steps("do the cameras agree")
-    agree = _agreement_of_people(rig, census, first) if census is not None and several else _agreement_of_one(rig, first)
+    agree = _agreement_of_people(rig, census, first) if census is not None and several else _agreement_of_one(rig, first, spread)
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agree)
     refusal = _rig_refusal(look, first)
@@ -75,10 +75,15 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     return Survey(rig, silhouettes, silhouettes, first, look, census)
 
 
-def _agreement_of_one(rig: Rig, first: FirstSeconds) -> Agreement:
-    """Do the cameras agree about the person of the first seconds?"""
+def _agreement_of_one(rig: Rig, first: FirstSeconds, spread: Sequence[Seen] = ()) -> Agreement:
+    """Do the cameras agree about the person of the first seconds? A camera that disagrees there, but not in sets that are `spread` over the
+    film, shows a part of the person then, and is not to blame."""
     step = float(np.median(np.diff(first.times))) if len(first.times) > 1 else np.nan
-    return agreement(rig.cameras, first.masks, step)
+    found = agreement(rig.cameras, first.masks, step)
+    if not found.wrong or found.hopeless or len(spread) < SETS_COMPARED:
+        return found
+    over_film = agreement(rig.cameras, [seen.masks for seen in spread])
+    return found if over_film.wrong or None in over_film.apart else over_film
 
 
 def _agreement_of_people(rig: Rig, census: Census, first: FirstSeconds) -> Agreement:
