@@ -317,8 +317,8 @@ def _difference(where: str, before: Any, now: Any) -> str:
     """The first difference of two plain values in words; empty if they are equal."""
     if isinstance(before, dict) and isinstance(now, dict):
         return next(filter(None, (_difference(f"{where}.{key}", before.get(key), now.get(key)) for key in sorted(before | now))), "")
-    was, now_is = ("not given" if value is None else shown(value) for value in (before, now))
-    return "" if before == now else f"{where} was {was}, and is {now_is}"
+    was, found = ("not given" if value is None else shown(value) for value in (before, now))
+    return "" if before == now else f"{where} was {was}, and is {found}"
 
 
 def earlier_run(folder: str | Path) -> dict[str, Any] | None:

@@ -118,8 +118,6 @@ def _without_places(recording: Path, error: UncalibratedError, begun: bool) -> s
             f"docs/calibration.md), or move films that are not to be used out of the folder; then `{command}`, with the person's height")
 
 
-
-
 def place_cameras(rig: Rig, options: Options, listener: Listener | None = None, rough_focal: float = 0.0) -> Placed:
     """The places and directions of cameras with rough places, from the person in their films; focal lengths, too, unless `rough_focal` is 0
     (see `place_by_outlines`).
