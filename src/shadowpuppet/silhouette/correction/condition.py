@@ -107,10 +107,12 @@ class FilmCondition:
                           "are blurred, and thin limbs merge with what is behind them; film at a higher bit rate or quality",
                           "film is compressed too much: use a higher quality", HARMFUL)
         elif lasts and self.noise > WARN_ERROR:
-            again = "film the empty scene" if recovered else "take the empty scene again"
-            yield Caution(f"the film differs from its empty scene by {self.noise:.1f} grey levels in light that no smooth change explains: "
-                          f"clothes like the background are missed; {again} in this light",
-                          f"light differs from the empty scene's: film that{'' if recovered else ' again'}", HARMFUL)
+            scene, remedy, short = "its empty scene", "take the empty scene again", "light differs from the empty scene's: film that again"
+            if recovered:
+                scene, remedy = "the empty scene that was recovered from it", "film the empty scene"
+                short = "the recovered empty scene differs from the film: film it"
+            yield Caution(f"the film differs from {scene} by {self.noise:.1f} grey levels in light that no smooth change explains: "
+                          f"clothes like the background are missed; {remedy} in this light", short, HARMFUL)
         elif self.noise > WARN_NOISE:
             yield Caution(f"the film is noisy ({self.noise:.1f} grey levels after smoothing): clothes like the background are missed; use "
                           "more light, or less gain of the camera", "film is noisy: use more light", HARMFUL)
