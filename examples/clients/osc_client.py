@@ -7,6 +7,7 @@ right, Y up, Z forward, left-handed. The age is the time from a picture's captur
 """
 
 import argparse
+import contextlib
 
 import numpy as np
 from pythonosc.dispatcher import Dispatcher
@@ -38,4 +39,5 @@ dispatcher = Dispatcher()
 dispatcher.map("/VMC/Ext/Bone/Pos", lambda _, name, *values: bones.update({name: values}))
 dispatcher.map("/shadowpuppet/age", lambda _, age: bones.update(age=age))
 dispatcher.map("/VMC/Ext/T", show)
-BlockingOSCUDPServer(("127.0.0.1", args.port), dispatcher).serve_forever()
+with contextlib.suppress(KeyboardInterrupt):
+    BlockingOSCUDPServer(("127.0.0.1", args.port), dispatcher).serve_forever()

@@ -6,7 +6,9 @@ Metres in the calibration's world: right-handed, Z up. The age is the time from 
 """
 
 import argparse
+import contextlib
 import json
+import sys
 
 from websockets.sync.client import connect
 
@@ -15,9 +17,15 @@ parser.add_argument("--address", default="ws://127.0.0.1:8601")
 parser.add_argument("--joint", default="left_hand")
 args = parser.parse_args()
 
-with connect(args.address) as session:
+try:
+    session = connect(args.address)
+except OSError as error:
+    sys.exit(f"nothing at {args.address} ({error}): start `shadowpuppet live ... --websocket 8601` or `play RUN --websocket 8601`")
+with session, contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
     for message in map(json.loads, session):
         if message["type"] == "begin":
+            if args.joint not in message["joints"]:
+                sys.exit(f"--joint: found {args.joint!r}, expected one of {', '.join(message['joints'])}")
             number = message["joints"].index(args.joint)
         elif message["joints"] is not None:
             x, y, z = message["joints"][number]

@@ -523,7 +523,7 @@ def test_control_c_and_the_like_leave_a_run_that_can_be_read_and_goes_on(recordi
     child.send_signal(number)
     _, err = child.communicate()
     assert child.returncode == code
-    said = rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}; --resume goes on with them"
+    said = rf"interrupted: the \d+ frames so far are in {re.escape(str(folder))}; the same command with --resume goes on with them"
     assert re.fullmatch(said, err.splitlines()[-1])
     left = read_run(folder)
     assert not left.complete
@@ -534,15 +534,16 @@ def test_control_c_and_the_like_leave_a_run_that_can_be_read_and_goes_on(recordi
 def interrupted_in(folder):
     with terminal_module.terminal(quiet=True, folder=folder, resume="; --resume"):
         (folder / "run.toml").write_text("complete = false\n", encoding="utf-8")
+        (folder / "joints.csv").write_text("time,x\n0,1\n1,1\n", encoding="utf-8")
         raise KeyboardInterrupt
 
 
-def test_what_an_interrupted_run_had_written_before_its_first_frame_was_counted_is_said(tmp_path):
-    for before in (False, True):
-        (tmp_path / "run.toml").write_text("complete = false\n" if before else "complete = true\n", encoding="utf-8")
-        with pytest.raises(KeyboardInterrupt) as stop:
-            interrupted_in(tmp_path)
-        assert str(stop.value) == ("nothing was written" if before else f"the frames so far are in {tmp_path}; --resume")
+@pytest.mark.parametrize(("before", "said"), [(False, "the 2 frames so far are in {}; --resume"), (True, "nothing was written")])
+def test_frames_that_an_interrupted_run_had_written_before_one_was_counted_are_said(tmp_path, before, said):
+    (tmp_path / "run.toml").write_text(f"complete = {'false' if before else 'true'}\n", encoding="utf-8")
+    with pytest.raises(KeyboardInterrupt) as stop:
+        interrupted_in(tmp_path)
+    assert str(stop.value) == said.format(tmp_path)
 
 
 def test_an_earlier_run_is_replaced_only_if_asked_to(shell, recording, run, monkeypatch, tmp_path):

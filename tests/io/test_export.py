@@ -152,7 +152,7 @@ def test_a_killed_run_is_exported_as_far_as_it_came(shell, whole, tmp_path):
         (folder / name).write_text("".join(lines[:12]) + lines[12][:20])
     code, _, err = shell("export", folder, "--to", "bvh,c3d,mot,glb")
     assert code == 0
-    assert "the run was broken off: 11 frames of it are exported; `track --resume` goes on with it" in err
+    assert "the run was broken off: 11 frames of it are exported, as tracked, not smoothed; `shadowpuppet track " in err
     motion = read_run(whole).motion
     found = read_bvh(folder / "export" / "run.bvh").joints().select(motion.joint_names).positions @ Y_UP
     assert len(found) == 11

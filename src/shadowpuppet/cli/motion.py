@@ -89,7 +89,7 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.io.export import export_run
     from shadowpuppet.io.people import person_folders
-    from shadowpuppet.io.run import read_run
+    from shadowpuppet.io.run import read_run, resuming
 
     formats = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
     with terminal(quiet) as listener:
@@ -105,7 +105,8 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
         written = export_run(run, formats, folder, unit, missing, model, weight, rest, names)
         for of, each in runs:
             if not each.complete:
-                listener.warn(f"the run{of} was broken off: {len(each.motion)} frames of it are exported; `track --resume` goes on with it")
+                listener.warn(f"the run{of} was broken off: {len(each.motion)} frames of it are exported, as tracked, not smoothed; "
+                              f"{resuming(each)}")
             verdict = each.metrics.get("verdict", {})
             if verdict.get("word") == "bad":
                 why = "; ".join(verdict["reasons"])

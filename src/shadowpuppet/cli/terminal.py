@@ -195,9 +195,8 @@ def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "no
         except KeyboardInterrupt as interrupt:
             if interrupt.args:
                 raise  # its message already says what was kept
-            number = f"{listener.frames} " if listener.frames else ""
-            some = folder is not None and (listener.frames or (_is_broken_off(folder) and not before))
-            kept = f"the {number}frames so far are in {folder}{resume}" if some else nothing
+            number = _rows(folder) or listener.frames if listener.frames or not before else 0
+            kept = f"the {number} frames so far are in {folder}{resume}" if number and folder is not None else nothing
             raise KeyboardInterrupt(kept) from None
         finally:
             listener.stop()
@@ -207,3 +206,9 @@ def _is_broken_off(folder: Path | None) -> bool:
     """Whether a folder holds a run that did not come to its end."""
     run = None if folder is None else folder / "run.toml"
     return run is not None and run.exists() and "complete = false" in run.read_text(encoding="utf-8", errors="replace")
+
+
+def _rows(folder: Path | None) -> int:
+    """Number of frames in the tables of a run that did not come to its end; 0 if there are none."""
+    joints = None if folder is None or not _is_broken_off(folder) else folder / "joints.csv"
+    return 0 if joints is None or not joints.exists() else max(joints.read_text(encoding="utf-8", errors="replace").count("\n") - 1, 0)

@@ -71,7 +71,7 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
         _check_earlier(folder, force)
     try:
         nothing = f"{folder} is as it was" if resume else "nothing was written"
-        with terminal(quiet, folder, nothing, verbose, "; --resume goes on with them") as listener:
+        with terminal(quiet, folder, nothing, verbose, "; the same command with --resume goes on with them") as listener:
             summary = track_recording(recording, folder, options, listener, resume=resume)
         motion, metrics = summary.motion, summary.metrics
     except CompleteRun as error:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import FormatError, ShadowPuppetError, warn
+from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.evaluation.error_metrics import (
     acceleration_errors,
     aligned_errors,
@@ -33,8 +33,8 @@ from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.contacts import read_contacts
 from shadowpuppet.io.files.plain import for_json, plain
 from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.io.motion.motion_files import names_in, read_truth, up_axis
-from shadowpuppet.io.run import Run, read_run
+from shadowpuppet.io.motion.motion_files import check_unit, names_in, read_truth, up_axis
+from shadowpuppet.io.run import Run, read_run, resuming
 from shadowpuppet.io.run_writer import FILES, write_metrics
 from shadowpuppet.motion.metrics import GROUPS, JointErrors, evaluate, joint_errors
 from shadowpuppet.motion.motion import ROUNDING, JointTable
@@ -43,8 +43,6 @@ from shadowpuppet.video.moments import read_moment
 
 BRIEF = 0.5
 """Span (s) below which one that was given by whole numbers, which are frames, may have been meant in seconds."""
-OTHER_UNIT = 10.0
-"""Ratio of the sizes of the truth's person and the run's from which one of them is in another unit."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,8 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
     """
     how, run = how or Comparison(), read_run(folder)
     if not run.complete:
-        warn(f"{folder}: the run was broken off after {len(run.motion)} frames, which are measured; `track --resume` goes on with it")
+        warn(f"{folder}: the run was broken off after {len(run.motion)} frames, which are measured as tracked, not smoothed; "
+             f"{resuming(run)}")
     table = truth if truth is not None else _known_truth(run.info.get("truth"))
     if table is None and (how.angles or how.sync or how.align):
         asked = next(name for name in ("angles", "sync", "align") if getattr(how, name))
@@ -105,7 +104,7 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
     read = _cut(_within(run, read_truth(table, run.motion.joint_names), how), how, table)
     reference, clock = _on_our_clock(run, read, how, table)
     try:
-        _check_unit(run.motion.table, reference, table)
+        check_unit(run.motion.table, reference, table)
         reference, world = _in_our_world(run, reference, how, table)
         measured = evaluate(run.motion, reference, _joint_names(how.joints), camera=_single_camera(cameras), cameras=max(len(cameras), 1))
     except ShadowPuppetError as error:
@@ -160,8 +159,10 @@ def _error_metrics(run: Run, ours: JointTable, theirs: JointTable, errors: Joint
 
 
 def _within(run: Run, truth: JointTable, how: Comparison) -> JointTable:
-    """The truth in the span that the run was asked to track; all of it if it has another clock."""
+    """The truth in the span that the run was asked to track, up to where it was broken off; all of it if it has another clock."""
     begin, end = (run.info.get(key) for key in ("begin", "end"))
+    if not run.complete and len(run.motion):
+        end = float(run.motion.times[-1]) + 2 * ROUNDING  # its last frame counts
     if how.sync or how.offset or (begin is None and end is None):
         return truth
     return truth.between(begin or 0.0, np.inf if end is None else end)
@@ -221,22 +222,6 @@ def _on_our_clock(run: Run, truth: JointTable, how: Comparison, path: str | Path
     rates = {name: float(1 / step_of(table.times)) for name, table in (("run_hz", motion), ("truth_hz", truth))}
     return moved, rates | {"offset_s": offset} | (
         {"speed_error_m_s": found.error, "speed_error_before_m_s": found.before, "rival_s": found.rival} if found else {})
-
-
-def _check_unit(run: JointTable, truth: JointTable, path: str | Path) -> None:
-    """Raise `FormatError` if the truth's people are far from the size of the run's."""
-    ours, theirs = map(_extent, (run, truth))
-    ratio = theirs / ours if ours > 0 else np.nan
-    if ratio > OTHER_UNIT or ratio < 1 / OTHER_UNIT:
-        raise FormatError(f"{path}: found a person {ratio:.3g} times as large as the run's, expected metres"
-                          + (": are these millimetres?" if 500 < ratio < 2000 else ": are these centimetres?" if 50 < ratio < 200 else ""))
-
-
-def _extent(table: JointTable) -> float:
-    """Median distance of the joints from their middle; NaN if nothing is known."""
-    frames = table.positions[np.isfinite(table.positions).all(2).sum(1) > 1]
-    away = np.linalg.norm(frames - np.nanmean(frames, axis=1, keepdims=True), axis=2)
-    return float(np.nanmedian(away)) if len(frames) else np.nan
 
 
 def _in_our_world(run: Run, truth: JointTable, how: Comparison, path: str | Path) -> tuple[JointTable, dict[str, Any]]:

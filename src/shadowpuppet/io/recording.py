@@ -169,7 +169,7 @@ def _is_noted(folder: Path) -> bool:
 
 def is_run(folder: Path) -> bool:
     """Whether a folder holds a run, and no film but the run's overlay."""
-    return (folder / "run.toml").is_file() and not _is_noted(folder) and set(films_in(folder)) <= {"overlay"}
+    return (folder / "run.toml").is_file() and not _is_noted(folder) and set(films_in(folder)) <= {"overlay", "overlay.part"}
 
 
 def is_recording(folder: Path) -> bool:

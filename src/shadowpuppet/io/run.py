@@ -67,6 +67,12 @@ class Run:
         return float(self.info.get("floor", {}).get("height_m", 0.0))
 
 
+def resuming(run: Run) -> str:
+    """How to go on with a run that was broken off, in words."""
+    recording = run.info.get("recording", "RECORDING")
+    return f"`{typed('track', recording, '-o', run.folder, '--resume')}`, with the flags it had, goes on with it"
+
+
 def read_run(folder: str | Path) -> Run:
     """Read a run folder, also a killed run's. Raises `FormatError`, naming file, line and column, if something is malformed."""
     folder = Path(folder)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, choices, warn
+from shadowpuppet.io.person import read_person
 from shadowpuppet.io.recording import Recording, View, differ_by_padding, read_recording
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video import FrameSource, Image, camera_number, fitted, open_frames
@@ -30,6 +31,8 @@ RUNS_OF_SEVERAL, RUN_OF_SEVERAL = 8, 3
 the same."""
 FIRST_SECONDS, FIRST = 8.0, 16
 """Length of the film's beginning (s), and number of its frames that a sample keeps."""
+OTHER_HEIGHT = 0.03
+"""Difference (m) of a given height and that of given sizes from which on they are not one person's."""
 SPREAD = 60
 """Number of frames, spread over the whole film, from which an empty scene is recovered."""
 
@@ -149,8 +152,11 @@ def open_recording(path: str | Path, options: Options) -> Recording:
     fov = None if options.fov is None else float(np.radians(options.fov))
     asked = None if options.camera is None else names_in(options.camera)
     recording = read_recording(path, fov=fov, calibration=options.calibration, asked=asked)
-    subject = recording.subject
-    return cut(replace(recording, subject=replace(subject, height=options.height or subject.height,
+    subject, measured = recording.subject, None if options.person is None else read_person(options.person).height
+    if options.height and measured and abs(options.height - measured) > OTHER_HEIGHT:
+        raise SettingsError(f"height: found {options.height:g} m, but {options.person} has the sizes of a person of {measured:g} m: leave "
+                            "one of them out")
+    return cut(replace(recording, subject=replace(subject, height=options.height or measured or subject.height,
                                                   distance=options.distance or subject.distance)), options)
 
 

@@ -19,7 +19,7 @@ from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.plain import for_json, plain
 from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.io.motion.motion_files import read_truth
+from shadowpuppet.io.motion.motion_files import check_unit, read_truth
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.motion.motion import Motion
@@ -247,6 +247,7 @@ def evaluated(rig: Rig, motion: Motion) -> dict[str, Any]:
     try:
         truth = read_truth(rig.recording.truth, motion.joint_names) if rig.recording.truth is not None else None
         if truth is not None:
+            check_unit(motion.table, truth, rig.recording.truth)
             truth = truth.between(rig.recording.begin, np.inf if rig.recording.duration is None else rig.recording.duration)
         return evaluate(motion, truth, camera=camera, cameras=cameras)
     except ShadowPuppetError as error:  # the run is complete: a bad truth file must not discard it

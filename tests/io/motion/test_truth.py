@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from importlib.util import find_spec
 
 import biovision
@@ -15,11 +16,12 @@ from measured import moved, person
 from vicon import c3d
 
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
-from shadowpuppet.io.motion.motion_files import names_in, read_truth
+from shadowpuppet.io.motion.motion_files import check_unit, names_in, read_truth
 from shadowpuppet.io.motion.npz import write_npz
 from shadowpuppet.io.motion.parquet import write_parquet
 from shadowpuppet.io.motion.table import table_columns, write_joints
 from shadowpuppet.motion.metrics import LIMB_JOINTS
+from shadowpuppet.motion.motion import JointTable
 
 VICON = {"pelvis": "PELO", "neck": "TRXO", "head": "HEDO",
          **{f"{side}_{joint}": side[0].upper() + marker for side in ("left", "right") for joint, marker in
@@ -92,3 +94,16 @@ def test_a_damaged_file_is_read_or_refused_in_a_sentence(tmp_path, place, what, 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShadowPuppetWarning)
         assert told_or_read(lambda: read_truth(path), path.name)
+
+
+@pytest.mark.parametrize(("scale", "match"), [
+    (1000, "found a person 1,000 times .* are these mm\\? divide them by 1000"), (100, "found a person 100 times .* are these cm\\?"),
+    (0.01, "found a person 0.01 times"),
+])  # fmt: skip
+def test_a_truth_of_another_unit_is_told_by_the_joints_that_both_have(tmp_path, scale, match):
+    names = ("left_shoulder", "left_elbow", "left_wrist", "left_ankle")
+    truth = JointTable(np.arange(3.0), names, np.random.default_rng(0).normal(size=(3, 4, 3)))
+    run = truth.select(names[:3])
+    check_unit(run, truth, tmp_path / "truth.csv")
+    with pytest.raises(FormatError, match=match):
+        check_unit(run, replace(truth, positions=scale * truth.positions), tmp_path / "truth.csv")

@@ -29,6 +29,8 @@ LEG_LENGTHS = {"metres": (0.35, 1.1, 1.0), "centimetres": (42.0, 110.0, 0.01), "
 assuming that small children are not measured in inches."""
 ARM_TO_LEG = 1.48
 """Ratio of a leg's length to an arm's, shoulder to wrist (Drillis and Contini, in Winter 2009: 0.491 and 0.332 of the stature)."""
+OTHER_UNIT = 10.0
+"""Ratio of the sizes of the truth's person and the run's from which one of them is in another unit."""
 MIN_COSINE = 0.7
 """Least cosine between an axis and the mean direction from legs to head for the axis to count as up."""
 TO_Z_UP = {"+x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)), "-x": ((0, 0, 1), (0, 1, 0), (-1, 0, 0)), "+y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
@@ -91,6 +93,24 @@ def read_truth(path: str | Path, known: Sequence[str] = JOINTS) -> JointTable:
     ours = renamed(table)
     others = table.select(same)
     return JointTable(table.times, (*ours.names, *others.names), np.concatenate([ours.positions, others.positions], 1))
+
+
+def check_unit(run: JointTable, truth: JointTable, path: str | Path) -> None:
+    """Raise `FormatError` if the truth's person is far from the size of the run's."""
+    shared = [name for name in run.names if name in truth.names]
+    ours, theirs = (_extent(table.select(shared)) for table in (run, truth))
+    ratio = theirs / ours if ours > 0 else np.nan
+    if ratio > OTHER_UNIT or ratio < 1 / OTHER_UNIT:
+        unit = "mm" if 500 < ratio < 2000 else "cm" if 50 < ratio < 200 else ""
+        remedy = f": are these {unit}? divide them by {1000 if unit == 'mm' else 100}" if unit else ""
+        raise FormatError(f"{path}: found a person {ratio:,.5g} times as large as the run's, expected metres{remedy}")
+
+
+def _extent(table: JointTable) -> float:
+    """Median distance of the joints from their middle; NaN if nothing is known."""
+    frames = table.positions[np.isfinite(table.positions).all(2).sum(1) > 1]
+    away = np.linalg.norm(frames - np.nanmean(frames, axis=1, keepdims=True), axis=2)
+    return float(np.nanmedian(away)) if len(frames) else np.nan
 
 
 def names_in(path: str | Path) -> str:
