@@ -245,9 +245,10 @@ def evaluated(rig: Rig, motion: Motion) -> dict[str, Any]:
     """Metrics of a motion, with errors if the recording has a matching ground truth; a single camera defines the depth direction."""
     camera, cameras = None if rig.is_multiview else rig.cameras[0], len(rig.cameras)
     try:
-        truth = read_truth(rig.recording.truth, motion.joint_names) if rig.recording.truth is not None else None
-        if truth is not None:
-            check_unit(motion.table, truth, rig.recording.truth)
+        truth, path = None, rig.recording.truth
+        if path is not None:
+            truth = read_truth(path, motion.joint_names)
+            check_unit(motion.table, truth, path)
             truth = truth.between(rig.recording.begin, np.inf if rig.recording.duration is None else rig.recording.duration)
         return evaluate(motion, truth, camera=camera, cameras=cameras)
     except ShadowPuppetError as error:  # the run is complete: a bad truth file must not discard it
