@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from copy import deepcopy
 from dataclasses import replace
 
@@ -186,6 +188,13 @@ def test_work_in_the_background_gives_its_result_or_its_error():
             thread.join(10)
     with pytest.raises(ZeroDivisionError):
         failed()
+
+
+def test_the_program_s_end_waits_for_a_task():
+    text = ("import time\nfrom shadowpuppet.live.phases import in_background\n"
+            "in_background(lambda: (time.sleep(0.3), print('measured', flush=True)))")
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("measured\n", "")
 
 
 def test_known_sizes_are_kept(pictures):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
 import threading
+import weakref
 from collections import deque
 from collections.abc import Callable
 from typing import TypeVar
@@ -108,8 +110,21 @@ def in_background(task: Callable[[], Result]) -> Callable[[], Result | None]:
             raise failed[0]
         return done[0] if done else None
 
-    threading.Thread(target=run, name="measuring", daemon=True).start()
+    thread = threading.Thread(target=run, name="measuring", daemon=True)
+    _RUNNING.add(thread)
+    thread.start()
     return result
+
+
+_RUNNING = weakref.WeakSet[threading.Thread]()
+ENDING = 10.0
+"""Longest time (s) that the program's end waits for a task: Python ends a thread that is in compiled code by aborting the program."""
+
+
+@atexit.register
+def _wait() -> None:
+    for thread in list(_RUNNING):
+        thread.join(ENDING)
 
 
 KEPT = 20
