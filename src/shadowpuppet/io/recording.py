@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -15,6 +14,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, choices, reason, typed, warn
 from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, read_calibration
 from shadowpuppet.io.calibration.formats import find_calibration
+from shadowpuppet.io.picture_sizes import check_sizes, without_padding
 from shadowpuppet.io.projects import Project, films_in, find_project, sources_in
 from shadowpuppet.io.recording_toml import RecordingNotes
 from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES, camera_number, open_frames
@@ -25,17 +25,15 @@ BOARD_FOLDERS = ("intrinsics", "extrinsics", "floor")
 """Folders of films of a board, from which cameras are calibrated."""
 RATES = (0.1, 10_000.0)
 """Limits of `rate`, frames/s."""
-BLOCK, MAX_PADDING = 16, 0.05
-"""Pixels to a side of H.264's blocks, and the largest share of a picture's side by which they may exceed it to be taken for padding."""
 STARTS, DURATIONS = (0.0, 100_000.0), (1e-3, 1e6)
 """Limits of `start` and `duration`, seconds."""
 
 
 class UncalibratedError(RecordingError):
-    """A recording that has films of cameras of which no calibration is known."""
+    """A recording some of whose cameras are not calibrated."""
 
     def __init__(self, message: str, cameras: Iterable[str] = (), known: Iterable[str] = ()) -> None:
-        """The sentence, the names of these cameras, and those of which one is known."""
+        """The message, the names of the cameras without a calibration, and the names of those with one."""
         super().__init__(message)
         self.cameras, self.known = tuple(cameras), tuple(known)
 
@@ -135,8 +133,8 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
     if not named:
         raise RecordingError(f"{calibration}: found no camera {folder.stem!r}, after the film's name; cameras there: "
                              f"{choices(c.name for c in cameras)}")
-    view = _without_padding(View(named[0], source))
-    _check_sizes([view])
+    view = without_padding(View(named[0], source))
+    check_sizes([view])
     return Recording(folder, folder.stem, (view,))
 
 
@@ -205,9 +203,9 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
         instead = f" ({choices(pictures)} there: found a picture, expected a film)" if pictures else ""
         warn(f"{folder}: no film of {choices(missing)}{instead}; going on with {choices(films)}")
     starts = _starts(notes, cameras, asked)
-    views = tuple(_without_padding(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), starts.get(c.name, 0.0)))
+    views = tuple(without_padding(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), starts.get(c.name, 0.0)))
                   for c in cameras if c.name in films)
-    _check_sizes(views)
+    check_sizes(views)
     truth = notes.file("truth") or _first(folder, "truth", ["csv", "trc"])
     training = notes.file("training") or _first(folder, "training", ["csv", "trc", "c3d", "bvh", "amc"])
     rate = notes.number("rate", RATES, "frames/s")
@@ -284,7 +282,7 @@ def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration
     if len(films) > 1:
         by_board, by_person = (typed("calibrate", folder, *more) for more in ((), ("--from-person", "--height", "METRES")))
         raise UncalibratedError(f"{folder}: no calibration.toml for its {len(films)} cameras ({choices(films)}); several cameras must be "
-                                f"calibrated together: by films of a printed board, put into its intrinsics/ and extrinsics/ "
+                                "calibrated together: by films of a printed board, put into its intrinsics/ and extrinsics/ "
                                 f"(`{by_board}`, docs/calibration.md), or by the person who walks there, from a rough.toml that says where "
                                 f"they stand (`{by_person}`)", films)
     if fov is None:
@@ -303,60 +301,6 @@ def _check_names(place: Path, sources: Iterable[str], cameras: Iterable[Camera],
         if kind == "video":
             raise UncalibratedError(f"{found}; a film has the name of its camera; --camera leaves films out", unknown, known)
         raise RecordingError(found)
-
-
-def _without_padding(view: View) -> View:
-    """The view, its camera of the film's size if the two differ by the padding of H.264 alone, with a warning.
-
-    H.264 codes blocks of 16 pixels, and some programs show the rows and columns that fill the last ones: 1088 rows of 1080. They are added
-    at the bottom and the right, so that the other pixels and the camera's matrix stay. Live cameras are not opened.
-    """
-    if camera_number(view.video) is not None:
-        return view
-    found, expected = open_frames(view.video).size, view.camera.size
-    if found == expected or not differ_by_padding(found, expected):
-        return view
-    which = ("film", "calibration") if sum(found) > sum(expected) else ("calibration", "film")
-    warn(f"{view.video}: found pictures of {found[0]} x {found[1]} pixels, the calibration of camera {view.camera.name!r} is for "
-         f"{expected[0]} x {expected[1]}; the {which[0]} has the padding of H.264 at the bottom or right, the {which[1]} has not: points "
-         "stay where they are")
-    return replace(view, camera=replace(view.camera, size=found))
-
-
-def differ_by_padding(first: tuple[int, int], second: tuple[int, int]) -> bool:
-    """Whether two sizes (width, height) are equal but for the padding of H.264."""
-    return all(_is_padded(a, b) or _is_padded(b, a) for a, b in zip(first, second))
-
-
-def _is_padded(size: int, bare: int) -> bool:
-    """Whether `size` is `bare`, or `bare` filled up to whole blocks of H.264."""
-    return size == bare or (size == -(-bare // BLOCK) * BLOCK and size - bare < MAX_PADDING * bare)
-
-
-def _check_sizes(views: Iterable[View]) -> None:
-    """Raise `RecordingError` if pictures do not have their camera's size, which an empty scene and masks may have without the film's
-    padding, or with it; live cameras are not opened."""
-    for view in views:
-        for source in (view.video, view.background, view.masks):
-            if source is None or camera_number(source) is not None:
-                continue
-            found, (width, height) = open_frames(source).size, view.camera.size
-            if found != (width, height) and not (source is not view.video and differ_by_padding(found, (width, height))):
-                raise RecordingError(f"{source}: found pictures of {found[0]} x {found[1]} pixels, the calibration of camera "
-                                     f"{view.camera.name!r} is for {width} x {height}; "
-                                     + _remedy(found, (width, height), source is view.video))
-
-
-def _remedy(found: tuple[int, int], expected: tuple[int, int], is_film: bool) -> str:
-    """What to do about pictures of another size than the calibration's: of the film itself, or of the empty scene or masks."""
-    scale = found[0] / expected[0]
-    if found == expected[::-1]:
-        return "they are turned by a quarter: turn one of them"
-    if not is_film:
-        return "they must come from the same camera at the same setting as the film, which has that size"
-    if math.isclose(scale, found[1] / expected[1], rel_tol=0.01):
-        return f"they have the same shape: scale the film, or set size to {list(found)} and multiply the matrix by {scale:g}"
-    return "give the film that was calibrated, or calibrate this one"
 
 
 def _references(folder: Path) -> tuple[Reference, ...]:

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, choices, warn
 from shadowpuppet.io.person import read_person
-from shadowpuppet.io.recording import Recording, View, differ_by_padding, read_recording
+from shadowpuppet.io.picture_sizes import differ_by_padding
+from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video import FrameSource, Image, camera_number, fitted, open_frames
 from shadowpuppet.video.frames import ROUNDING, Wanted
