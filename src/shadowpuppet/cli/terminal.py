@@ -195,7 +195,9 @@ def terminal(quiet: bool = False, folder: Path | None = None, nothing: str = "no
         except KeyboardInterrupt as interrupt:
             if interrupt.args:
                 raise  # its message already says what was kept
-            number = _rows(folder) or listener.frames if listener.frames or not before else 0
+            number = 0
+            if listener.frames or not before:
+                number = _rows(folder) or listener.frames
             kept = f"the {number} frames so far are in {folder}{resume}" if number and folder is not None else nothing
             raise KeyboardInterrupt(kept) from None
         finally:

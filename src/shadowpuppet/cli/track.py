@@ -109,8 +109,8 @@ def _people_done(folder: Path, metrics: Mapping[str, Any], quiet: bool) -> int:
     if not quiet:
         names = [f"person-{number}" for number in people]
         verdicts = [verdict_of(each["verdict"], f"person {number}") for number, each in people.items() if "verdict" in each]
-        show(people_table(people), *verdicts, pairs([("speed", f"{metrics['frames_per_s']:.1f} frame sets/s"),
-                                          files_in(folder, "people.csv", "overlay.mp4", *names)]))
+        speed = "speed", f"{metrics['frames_per_s']:.1f} frame sets/s"
+        show(people_table(people), *verdicts, pairs([speed, files_in(folder, "people.csv", "overlay.mp4", *names)]))
     lost = [number for number, each in people.items() if is_lost(each["status"], each["frames"])]
     if len(lost) < len(people):
         return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import ShadowPuppetError, warn
+from shadowpuppet.errors import ShadowPuppetError, typed, warn
 from shadowpuppet.evaluation.error_metrics import (
     acceleration_errors,
     aligned_errors,
@@ -176,8 +175,8 @@ def _cut(truth: JointTable, how: Comparison, path: str | Path) -> JointTable:
         raise ShadowPuppetError(f"start: found {how.start}, expected 0 to {last}, a frame of {path}")
     if not start <= end <= last:
         raise ShadowPuppetError(f"end: found {how.end}, expected {start} to {last}, a frame of {path}")
-    typed = [each for each in (how.start, how.end) if isinstance(each, str) and each.isdigit()]
-    if len(typed) == 2 and truth.times[end] - truth.times[start] < BRIEF:
+    bare = [each for each in (how.start, how.end) if isinstance(each, str) and each.isdigit()]
+    if len(bare) == 2 and truth.times[end] - truth.times[start] < BRIEF:
         warn(f"start {start} and end {end} are frames of {path}, {end - start + 1} in all; seconds are written {start}.0 and {end}.0")
     frames = slice(start, end + 1)
     return JointTable(truth.times[frames], truth.names, truth.positions[frames])
@@ -248,7 +247,7 @@ def _turned_up(run: JointTable, truth: JointTable, path: str | Path) -> str:
     axis = up_axis(truth)
     if axis == "+z" or up_axis(run) != "+z":
         return ""
-    return f"; {axis.upper()} points up in {path}: `shadowpuppet convert {shlex.quote(str(path))} truth.csv` turns it"
+    return f"; {axis.upper()} points up in {path}: `{typed('convert', path, 'truth.csv')}` turns it"
 
 
 def _joint_names(joints: Sequence[str] | None) -> list[str] | None:

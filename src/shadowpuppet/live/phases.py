@@ -91,6 +91,17 @@ def unfit(mask: Mask) -> str:
 Result = TypeVar("Result")
 
 
+_RUNNING = weakref.WeakSet[threading.Thread]()
+ENDING = 10.0
+"""Longest time (s) that the program's end waits for a task: Python ends a thread that is in compiled code by aborting the program."""
+
+
+@atexit.register
+def _wait() -> None:
+    for thread in list(_RUNNING):
+        thread.join(ENDING)
+
+
 def in_background(task: Callable[[], Result]) -> Callable[[], Result | None]:
     """Start a task in a daemon thread; returns a function that returns the result, or None while it is not ready.
 
@@ -114,17 +125,6 @@ def in_background(task: Callable[[], Result]) -> Callable[[], Result | None]:
     _RUNNING.add(thread)
     thread.start()
     return result
-
-
-_RUNNING = weakref.WeakSet[threading.Thread]()
-ENDING = 10.0
-"""Longest time (s) that the program's end waits for a task: Python ends a thread that is in compiled code by aborting the program."""
-
-
-@atexit.register
-def _wait() -> None:
-    for thread in list(_RUNNING):
-        thread.join(ENDING)
 
 
 KEPT = 20

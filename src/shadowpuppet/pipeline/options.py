@@ -167,7 +167,7 @@ def settings_in(data: Mapping[str, Any], path: Path, source: str | None = None) 
     data = dict(data["settings"] if isinstance(data.get("settings"), dict) and "versions" in data else data)
     names = {f.name for f in fields(Options)}
     if source is None and {"case", "grid", "seeds"} & set(data):
-        raise SettingsError(f"{source or path}: found a file for `shadowpuppet batch`, expected settings of one run")
+        raise SettingsError(f"{path}: found a file for `shadowpuppet batch`, expected settings of one run")
     if unknown := set(data) - names:
         raise SettingsError(f"{source or path}: unknown setting {min(unknown)!r}; there are: {choices(names)}")
     return data | {key: str(path.parent / data[key]) for key in PATHS if isinstance(data.get(key), str)}

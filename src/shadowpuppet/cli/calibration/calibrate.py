@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml and films of a board: intrinsics/CAMERA.mp4, "
                                                          "extrinsics/CAMERA.mp4, floor/CAMERA.mp4 or .jpg.")] = None, /, *,
               board: Annotated[str | None, flag("The board in place of board.toml: 'charuco 7x5' or 'checkerboard 9x6', counted "
-                                                  "in squares along a row and a column. OpenCV counts a checkerboard's inner corners, one "
-                                                  "less each way (8x5).")] = None,
+                                               "in squares along a row and a column. OpenCV counts a checkerboard's inner corners, one "
+                                               "less each way (8x5).")] = None,
               square: Annotated[float | None, flag("Side of the board's squares in metres, as measured on the print.")] = None,
               dictionary: Annotated[str | None, flag("A ChArUco board's set of markers, such as 4X4_50 or 5X5_100.")] = None,
               lenses: Annotated[Path | None, flag("A calibration whose lenses are kept; only places are solved.")] = None,

@@ -106,7 +106,7 @@ def open_rough(recording: Path, options: Options) -> tuple[Rig, float]:
 
 
 def _without_places(recording: Path, error: UncalibratedError, begun: bool) -> str:
-    """What to write about the places of cameras of which there are films; `begun`: there is a rough.toml, without them."""
+    """What to write into rough.toml for the cameras that have a film but no place, for a message; `begun`: whether the file exists."""
     file, cameras = recording / ROUGH_NAME, error.cameras
     if len(cameras) == 1 and not error.known:
         return f"{recording}: found one camera, expected two or more: outlines are compared"
