@@ -15,7 +15,7 @@ from proving_ground import made as made_ground
 from spoiled import SPOILS
 
 from shadowpuppet.body.skeleton import Skeleton
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.evaluation.joint_angles import wrapped
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
@@ -202,7 +202,7 @@ def track_multiview(path: Path) -> Iterator[Tracked]:
     survey = survey_rig(open_rig(path, options), options)
     subject = fit_multiview(np.random.default_rng(0), survey, options)
     truth, rate = read_joints(path / "truth.csv"), survey.rig.rate
-    frames = [(each.time, each.masks) for each in read_frames(survey.rig, [each.following() for each in survey.silhouettes])]
+    frames = [(each.time, each.seen.masks) for each in read_frames(survey.rig, [each.following() for each in survey.silhouettes])]
     empty = [np.zeros(camera.size[::-1], bool) for camera in subject.hull.cameras]
     films = [[none if (mask := masks[n]) is None else mask for _, masks in frames] for n, none in enumerate(empty)]
     times, body, names = [time for time, _ in frames], subject.body, subject.body.landmark_names
@@ -214,7 +214,7 @@ def track_multiview(path: Path) -> Iterator[Tracked]:
         rng, doubt, state, before, rows = np.random.default_rng(1), MultiviewDoubt(subject.tracker), None, None, []
         motion = MotionBuilder("", [dof.name for dof in body.skeleton.dofs], [names[column] for column in subject.joint_columns])
         for seconds, masks in zip(times, zip(*spoiled)):
-            observation = subject.observe(masks)
+            observation = subject.observe(Seen(masks))
             state = subject.next_state(rng, state, observation)
             if state is None:
                 motion.append(MotionFrame(seconds, "absent"))

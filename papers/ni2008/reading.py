@@ -58,7 +58,7 @@ def read(source: Source) -> tuple[tuple[Camera, ...], dict[str, NDArray[Any]]]:
     if survey.look.refusal is not None:
         raise TrackingError(f"{survey.look.recording}: {survey.look.refusal}")
     sets = read_frames(rig, [each.following() for each in survey.silhouettes], ready=source.masks)
-    seen = (Seen(each.time, list(each.masks)) for each in sets)
+    seen = (Seen(each.time, list(each.seen.masks)) for each in sets)
     return rig.cameras, _arrays(rig.cameras, rig.rate, seen, read_joints(recording.truth), read_motion(recording.training), OPENED)
 
 

@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from solids import seen_by
 
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import CalibrationError, SettingsError, TrackingError
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.run import read_run
@@ -110,7 +111,7 @@ def test_a_camera_that_freezes_is_set_aside_by_name_and_taken_back():
     for n in range(24):
         seen = masks(n)
         seen[1] = masks(5)[1] if 5 < n < 18 else seen[1]
-        session._masks = lambda shot, images, seen=seen: tuple(seen)
+        session._see = lambda shot, images, seen=seen: Seen(tuple(seen))
         now[0] = n / 20
         outcome = session.step(SnapshotSet(now[0], tuple(each[0] for each in scene), number=n))
         assert outcome.frame is not None

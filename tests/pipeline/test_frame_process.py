@@ -79,7 +79,7 @@ def test_the_sets_are_those_of_threads(tmp_path, started, more):
     assert all(map(alike, ours, theirs))
     assert len(theirs[0].points.points)
     assert all((image is None) != wanted.images for each in theirs for image in each.images)
-    theirs[0].masks[0][0, 0] = True  # arrays belong to who has them
+    theirs[0].seen.masks[0][0, 0] = True  # arrays belong to who has them
 
 
 def test_its_warnings_are_ours(tmp_path, started):

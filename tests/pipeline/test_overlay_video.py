@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import runs
 
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.motion.limbs import LIMBS
 from shadowpuppet.motion.motion import MotionFrame
@@ -33,7 +34,8 @@ def films(without: int | None = None) -> FrameSet:
     rng = np.random.default_rng(5)
     images = [rng.integers(0, 256, (*SIZE[::-1], 3), np.uint8) for _ in CAMERAS]
     masks = [np.arange(SIZE[1])[:, None] > np.full(SIZE[0], 200) for _ in CAMERAS]
-    return FrameSet(2.0, *(tuple(None if n == without else each for n, each in enumerate(of)) for of in (images, masks)))
+    images, masks = (tuple(None if n == without else each for n, each in enumerate(of)) for of in (images, masks))
+    return FrameSet(2.0, images, Seen(masks))
 
 
 def shown(found: MotionFrame, last: MotionFrame | None = None, without: int | None = None) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.body.whole_body import anatomical
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import HARMFUL, NOTED
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.person import read_person
@@ -162,7 +163,7 @@ def test_the_first_search_is_about_a_doubted_front(untaught, monkeypatch):
     subject = person_rig.fit_multiview(np.random.default_rng(0), survey, options)
     start = MultiviewTracker.start
     monkeypatch.setattr(MultiviewTracker, "start", lambda self, *given, **named: facing.append(named) or start(self, *given, **named))
-    seen = [subject.observe(masks) for masks in survey.first.masks[:2]]
+    seen = [subject.observe(Seen(masks)) for masks in survey.first.masks[:2]]
     doubted = dataclasses.replace(subject, front=Front(0.3, seen[0].points.points.mean(0), 0.1))
     for person, observation in ((subject, seen[0]), (doubted, seen[0]), (doubted, seen[1])):
         person.next_state(np.random.default_rng(0), None, observation)

@@ -62,7 +62,7 @@ def numbers(made: Rig, **more) -> list[tuple[int | None, ...]]:
     """Of the frames of every set."""
     sets = list(synchronized_frames(made, [bright] * len(made.footage), **more))
     for each in sets:
-        for image, mask in zip(each.images, each.masks):
+        for image, mask in zip(each.images, each.seen.masks):
             assert (image is None) == (mask is None)
             assert image is None or (mask == (image[:, :, 1] > 127)).all()
     return [tuple(None if image is None else number_of(image) for image in each.images) for each in sets]
@@ -105,7 +105,7 @@ def test_only_every_nth_set_is_looked_at(tmp_path, every):
     sets = list(synchronized_frames(made, [see] * 2, every=every))
     assert [number_of(each.images[0]) for each in sets] == list(range(0, 11, every))
     assert sorted(looked) == sorted(2 * list(range(0, 11, every)))
-    assert all(mask is not None for each in sets for mask in each.masks)
+    assert all(mask is not None for each in sets for mask in each.seen.masks)
 
 
 def test_a_slower_camera_is_missing_between_its_frames(tmp_path):
@@ -258,7 +258,7 @@ def test_a_silhouette_that_cannot_be_made_costs_that_camera_only(tmp_path):
 
     with pytest.warns(ShadowPuppetWarning, match="none left; from there on the run goes on without camera 'cam2'"):
         sets = list(synchronized_frames(made, [bright, fails]))
-    assert [each.masks[1] is not None for each in sets] == [n < 4 for n in range(12)]
+    assert [each.seen.masks[1] is not None for each in sets] == [n < 4 for n in range(12)]
     assert len(sets) == 12
 
 

@@ -8,6 +8,7 @@ import pytest
 from follower import followed
 
 from shadowpuppet.camera.colour_codes import colour_codes, thinned
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.prepare import MULTIVIEW
@@ -77,39 +78,39 @@ def test_long_films_are_not_kept(track):
 def test_a_store_gives_back_what_it_got(rng, shape):
     store, masks = MaskStore(), rng.random((4, 2, *shape)) < 0.5
     for n, (one, other) in enumerate(masks):
-        store.add(n / 10, (one, None, other))
+        store.add(n / 10, Seen((one, None, other)))
     assert [each.time for each in store] == [0, 0.1, 0.2, 0.3]
     assert 0 < store.size < 8 * (-(-shape[0] * shape[1] // 8) + 20)
-    assert all(each.masks[1] is None and each.images == (None,) * 3 for each in store)
-    np.testing.assert_array_equal([[each.masks[0], each.masks[2]] for each in store], masks)
+    assert all(each.seen.masks[1] is None and each.images == (None,) * 3 for each in store)
+    np.testing.assert_array_equal([[each.seen.masks[0], each.seen.masks[2]] for each in store], masks)
 
 
 def test_a_store_keeps_what_cameras_had_before_others_added_to_it(rng):
     store, (masks, own) = MaskStore(), rng.random((2, 3, 6, 7)) < 0.5
-    given = [FrameSet(0.0, (None,) * 3, tuple(masks), own=(*own[:2], None)), FrameSet(0.1, (None,) * 3, tuple(masks))]
+    given = [FrameSet(0.0, (None,) * 3, Seen(tuple(masks), own=(*own[:2], None))), FrameSet(0.1, (None,) * 3, Seen(tuple(masks)))]
     assert list(store.stored(given)) == given
     one, other = store
-    np.testing.assert_array_equal(one.masks, masks)
-    np.testing.assert_array_equal(one.own[:2], own[:2])
-    assert one.own[2] is None
-    assert other.own == ()
+    np.testing.assert_array_equal(one.seen.masks, masks)
+    np.testing.assert_array_equal(one.seen.own[:2], own[:2])
+    assert one.seen.own[2] is None
+    assert other.seen.own == ()
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (120, 160), (480, 640)])
 def test_a_store_keeps_the_colours_of_what_is_in_the_mask(rng, shape):
     store, mask = MaskStore(), rng.random(shape) < 0.5
     codes = colour_codes(rng.integers(0, 256, (*shape, 3), np.uint8))
-    store.add(0.0, [mask, mask, None], (), [codes, None, codes])
+    store.add(0.0, Seen((mask, mask, None), codes=(codes, None, codes)))
     (found,) = store
-    np.testing.assert_array_equal(found.codes[0], np.where(thinned(mask), codes, 0))
-    assert found.codes[1:] == (None, None)
+    np.testing.assert_array_equal(found.seen.codes[0], np.where(thinned(mask), codes, 0))
+    assert found.seen.codes[1:] == (None, None)
     assert store.size > 2 * -(-mask.size // 8)
 
 
 def test_a_full_store_holds_nothing():
     store, mask = MaskStore(limit=20), np.ones((8, 100), bool)
     for _ in range(5):
-        store.add(0.0, [mask])
+        store.add(0.0, Seen((mask,)))
     assert not store.sets
     assert store.size > store.limit
 

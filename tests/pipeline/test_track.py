@@ -91,7 +91,7 @@ def test_backward_the_arms_colours_are_known_from_the_start(recording, tmp_path,
     track_recording(recording, tmp_path / "run", make_options(QUICK))
     ((colours, sets),) = known
     assert colours.rest.sum() > 0
-    assert all(frames.codes[0][frames.masks[0]].any() for frames in sets)
+    assert all(frames.seen.codes[0][frames.seen.masks[0]].any() for frames in sets)
     track_recording(recording, tmp_path / "run", make_options(QUICK | {"tracker": {**QUICK["tracker"], "arm_colours": False}}))
     assert known[1][0] is None
 

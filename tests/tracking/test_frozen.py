@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.tracking.frozen import FROZEN_FRAMES, CameraWatch, is_frozen, same_silhouette
 from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 
@@ -46,7 +47,7 @@ def test_a_frozen_camera_is_noticed_although_others_add_to_its_silhouette():
     for n in range(25):
         own = [person(n), person(5 if n >= 5 else n), person(n)]
         masks = [own[0], own[1] | person(n + 3), own[2]]
-        kept = watch(n / RATE, masks, own)
+        kept = watch(n / RATE, Seen(tuple(masks), own=tuple(own))).masks
         assert all(a is None or a is b for a, b in zip(kept, masks))
         aside.append([a is None for a in kept])
         watch.tracked(())
@@ -106,7 +107,7 @@ def test_a_film_converted_to_a_higher_rate_is_not_frozen():
 
 def test_one_camera_is_never_set_aside_but_noted_as_blind():
     watch, full = RigWatch(1), np.ones((60, 80), bool)
-    kept = [watch(n / RATE, [picture]) for n, picture in enumerate([person(3), full, full, *[person(3)] * 30])]
+    kept = [watch(n / RATE, Seen((picture,))).masks for n, picture in enumerate([person(3), full, full, *[person(3)] * 30])]
     assert all(masks[0] is not None for masks in kept)
     (interval,) = watch.intervals
     assert (interval.camera, interval.why, interval.frames) == (0, "blind", 2)

@@ -7,6 +7,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shadowpuppet.camera.colour_codes import Codes
 from shadowpuppet.errors import TrackingError
 
 Mask = NDArray[np.bool_]
@@ -19,12 +20,16 @@ Value = TypeVar("Value", bound=np.generic)
 
 
 class Seen(NamedTuple):
-    """What the cameras show of a frame set."""
+    """What the cameras show of the person in a frame set: all the evidence that tracking has. By camera; None for one without a frame."""
 
     masks: tuple[Mask | None, ...]
-    """Silhouettes (H, W), by camera."""
+    """Silhouettes (H, W)."""
     shadows: tuple[Mask | None, ...] = ()
-    """Pixels (H / 2, W / 2), by camera, that were taken for shadow; empty: not known."""
+    """Pixels (H / 2, W / 2) that were taken for shadow; empty: not known."""
+    codes: tuple[Codes | None, ...] = ()
+    """Coarse colours (`camera.colour_codes`) in the light of the empty scene; empty: not known."""
+    own: tuple[Mask | None, ...] = ()
+    """Silhouettes (H, W) as each camera's own picture has them; empty where other cameras have added nothing to `masks`."""
 
 
 def check_mask(mask: ArrayLike, size: tuple[int, int], what: str = "mask") -> Mask:

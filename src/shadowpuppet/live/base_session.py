@@ -14,8 +14,7 @@ import numpy as np
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.colour_codes import Codes
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.geometry import Array
 from shadowpuppet.live.display.view import Angle, View
 from shadowpuppet.live.settings import LiveSettings
@@ -64,7 +63,7 @@ class Given(NamedTuple):
     """Seconds since its picture was captured."""
 
 
-class _Seen(NamedTuple):
+class _Waiting(NamedTuple):
     """What is shown of a frame that waits for the next ones."""
 
     captured: float
@@ -102,16 +101,12 @@ class LiveSession(ABC):
         self._began, self._lost_since, self._new, self._state, self._before = np.nan, np.nan, False, None, None
         self._lagging: FixedLag | None = None
         """Smooths the frames; None without a lag, and before there is a person."""
-        self._seen = dict[float, _Seen]()
+        self._waiting = dict[float, _Waiting]()
         """What belongs to the frames that wait, by their times."""
         self.leans = array("d")
         """`TrackedSubject.lean` of each frame."""
         self._watch: RigWatch | None = None
         """Which of several cameras are set aside."""
-        self._own: Masks = ()
-        """Masks (H, W) as each of several cameras has them, before others add to them."""
-        self._codes: tuple[Codes | None, ...] = ()
-        """`FrameSet.codes` of the last pictures."""
         self._measured: Callable[[], Any] = lambda: None
 
     @property
@@ -203,7 +198,7 @@ class LiveSession(ABC):
     def _scaled(self, shot: Any) -> Images: ...
 
     @abstractmethod
-    def _masks(self, shot: Any, images: Any) -> Masks: ...
+    def _see(self, shot: Any, images: Any) -> Seen: ...
 
     @abstractmethod
     def _learn(self, shot: Any, images: Any) -> Outcome: ...
@@ -230,8 +225,8 @@ class LiveSession(ABC):
 
     def _track(self, shot: Any, images: Any) -> Outcome:
         assert self.subject is not None
-        masks = self._masks(shot, images)
-        observation = self.subject.observe(masks if self._watch is None else self._watch(shot.captured, masks, self._own), self._codes)
+        seen = self._see(shot, images)
+        masks, observation = seen.masks, self.subject.observe(seen if self._watch is None else self._watch(shot.captured, seen))
         self._state = self.subject.next_state(self.rng, self._state, observation)
         if self._watch is not None:
             self._watch.tracked(self.subject.drawn(self._state))
@@ -247,24 +242,24 @@ class LiveSession(ABC):
         if self._lagging is None:
             late = now - shot.captured
             return Outcome(self._view(images, masks, frame, late), frame, images, (Given(frame, late),))
-        return self._later(_Seen(shot.captured, images, masks), frame)
+        return self._later(_Waiting(shot.captured, images, masks), frame)
 
-    def _later(self, seen: _Seen, frame: MotionFrame) -> Outcome:
+    def _later(self, waiting: _Waiting, frame: MotionFrame) -> Outcome:
         """The outcome of a frame that waits for the next ones: it shows the newest of those that are due, if any is."""
         assert self._lagging is not None
-        self._seen[frame.time] = seen
-        before = dict(self._seen)
+        self._waiting[frame.time] = waiting
+        before = dict(self._waiting)
         given = self._aged(self._lagging(frame))
         if not given:
-            return Outcome(self._view(), frame, seen.images)
+            return Outcome(self._view(), frame, waiting.images)
         shown = before[given[-1].frame.time]
         self.timing.given(given[-1].age)
-        return Outcome(self._view(shown.images, shown.masks, *given[-1]), frame, seen.images, given)
+        return Outcome(self._view(shown.images, shown.masks, *given[-1]), frame, waiting.images, given)
 
     def _aged(self, frames: Sequence[MotionFrame]) -> tuple[Given, ...]:
         """Frames that wait no more."""
         now = self.clock()
-        return tuple(Given(frame, now - self._seen.pop(frame.time).captured) for frame in frames)
+        return tuple(Given(frame, now - self._waiting.pop(frame.time).captured) for frame in frames)
 
     def _begin_tracking(self, subject: TrackedSubject) -> None:
         self.subject, self.phase, self._state, self._before, self._new = subject, "tracking", None, None, True

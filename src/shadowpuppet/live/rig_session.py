@@ -11,7 +11,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import colour_codes
-from shadowpuppet.camera.mask import may_be_person
+from shadowpuppet.camera.mask import Seen, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array, evenly_spread
@@ -25,7 +25,7 @@ from shadowpuppet.motion.motion import BLANK, MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, worked_size
 from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, check_body, fit_in_views
-from shadowpuppet.pipeline.rig import FrameSet, Segment
+from shadowpuppet.pipeline.rig import FrameSet, Segment, shown_in
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body
 from shadowpuppet.pipeline.survey.opening import OPENED, OPENING
@@ -187,7 +187,7 @@ class RigSession(LiveSession):
     def _wait(self, shot: SnapshotSet, images: Images) -> Outcome:
         if self._look_again(shot.captured, images, False):
             self.begin_waiting()
-        masks = self._masks(shot, images)
+        masks = self._see(shot, images).masks
         if sum(mask is not None and may_be_person(mask) and float(mask.mean()) > NOBODY / 3 for mask in masks) > 1:
             self._first.append((shot.captured, masks))
         else:
@@ -215,7 +215,7 @@ class RigSession(LiveSession):
         """Check whether the fit is ready."""
         found: MultiviewSubject | TrackingError | list[Scene] | None = self._measured()
         if found is None:
-            return Outcome(self._view(images, self._masks(shot, images) if self._segment else ()))
+            return Outcome(self._view(images, self._see(shot, images).masks if self._segment else ()))
         if isinstance(found, list):
             self._learnt(found)
         elif isinstance(found, TrackingError):
@@ -233,12 +233,11 @@ class RigSession(LiveSession):
         return tuple(None if image is None or n in self._without else scaled(image, camera)
                      for n, (image, camera) in enumerate(zip(shot.images, self._worked)))
 
-    def _masks(self, shot: SnapshotSet, images: Images) -> Masks:
+    def _see(self, shot: SnapshotSet, images: Images) -> Seen:
         found = [None if image is None else segment(CameraFrame(shot.captured, image, None))
                  for segment, image in zip(self._segment, images)]
-        self._own = tuple(None if each is None else each.mask for each in found)
-        self._codes = tuple(None if each is None else colour_codes(each.image) for each in found)
-        return self._share(found)
+        codes = tuple(None if each is None else colour_codes(each.image) for each in found)
+        return shown_in(found, self._share)._replace(codes=codes)
 
     def _forget_time(self) -> None:
         self._watch = None if self._watch is None else RigWatch(len(self.full))
@@ -252,7 +251,7 @@ class RigSession(LiveSession):
             return {}
         pictures = self.subject.pictures if isinstance(self.subject, MultiviewSubject) else self._pictures
         found = frame or MotionFrame(0.0, self.phase)
-        return {"image": overlay_grid(FrameSet(found.time, images, masks or (None,) * len(images)), found, pictures)}
+        return {"image": overlay_grid(FrameSet(found.time, images, Seen(masks or (None,) * len(images))), found, pictures)}
 
     def _aside(self) -> str:
         """Which cameras are left out or set aside, and why; empty if none is."""

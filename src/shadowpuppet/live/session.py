@@ -11,7 +11,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import colour_codes
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.person import Person
 from shadowpuppet.live.base_session import LiveSession, Outcome, scaled
@@ -132,7 +132,8 @@ class Session(LiveSession):
     def _wait(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
         if self._taken():
             return Outcome(self._view(images))
-        (mask,) = masks = self._masks(shot, images)
+        (mask,) = masks = self._see(shot, images).masks
+        assert mask is not None
         self._recent = [*self._recent[-7:], images[0]]
         self._collector.pictures.add(shot.captured, images[0])
         ready = self._still.see(shot.captured, mask)
@@ -149,7 +150,7 @@ class Session(LiveSession):
         """Check whether the task is ready."""
         found: Found | None = self._measured()
         if found is None:
-            return Outcome(self._view(images, self._masks(shot, images)))
+            return Outcome(self._view(images, self._see(shot, images).masks))
         self._seen_before(found.scene, found.tracked, found.clean)
         self._due, self._between = shot.captured + FIRST_REFINED, FIRST_REFINED
         if found.fit is not None:
@@ -219,15 +220,14 @@ class Session(LiveSession):
     def _scaled(self, shot: Snapshot) -> tuple[Image, ...]:
         return (scaled(shot.image, self.camera),)
 
-    def _masks(self, shot: Snapshot, images: tuple[Image, ...]) -> tuple[Mask, ...]:
+    def _see(self, shot: Snapshot, images: tuple[Image, ...]) -> Seen:
         """The silhouette (H, W); before tracking a clean one, as measuring a person needs."""
         clean = None if self._clean is None else self._clean.segmented
         segment = self._segment if self.phase == "tracking" else clean
         if segment is None:
-            return ()
+            return Seen(())
         found = segment(CameraFrame(shot.captured, images[0], None))
-        self._codes = (colour_codes(found.image),)
-        return (found.mask,)
+        return Seen((found.mask,), codes=(colour_codes(found.image),))
 
     def _forget_time(self) -> None:
         if self.phase == "learning":

@@ -55,7 +55,7 @@ class Task:
     corrected: bool = True
     """Whether `FrameSet.corrected` are wanted, at half size: every second pixel of every second row."""
     codes: bool = False
-    """Whether `FrameSet.codes` of several cameras are wanted."""
+    """Whether the colours (`Seen.codes`) of several cameras are wanted."""
     hull: VisualHull | None = None
     """Computes `FrameSet.points`; None: they are not wanted."""
 
@@ -63,13 +63,15 @@ class Task:
         """The frame sets, made here."""
         segment = [each.following() for each in self.silhouettes]
         with closing(read_frames(self.rig, segment, ready=self.ready, every=self.every)) as frames:
-            for seen in frames:
+            for each in frames:
                 begin = time.perf_counter()
-                points = None if self.hull is None else self.hull.points(seen.masks)
-                images = seen.images if self.images else (None,) * len(seen.images)
-                corrected = tuple(None if each is None else half_size(each) for each in seen.corrected) if self.corrected else ()
-                codes = tuple(map(colour_codes, seen.corrected)) if self.codes and seen.corrected else seen.codes
-                yield seen._replace(images=images, corrected=corrected, codes=codes, points=points, carving=time.perf_counter() - begin)
+                points = None if self.hull is None else self.hull.points(each.seen.masks)
+                images = each.images if self.images else (None,) * len(each.images)
+                corrected = tuple(None if image is None else half_size(image) for image in each.corrected) if self.corrected else ()
+                seen = each.seen
+                if self.codes and each.corrected:
+                    seen = seen._replace(codes=tuple(map(colour_codes, each.corrected)))
+                yield each._replace(images=images, seen=seen, corrected=corrected, points=points, carving=time.perf_counter() - begin)
 
     @property
     def is_long(self) -> bool:

@@ -65,7 +65,7 @@ def _grid(frames: FrameSet, people: Sequence[tuple[MotionFrame, Sequence[Picture
     for n, name in enumerate(names):
         y, x = divmod(n, columns)
         tile = out[y * height : (y + 1) * height, x * width : (x + 1) * width]
-        image, mask = frames.images[n], frames.masks[n]
+        image, mask = frames.images[n], frames.seen.masks[n]
         drawn = [(pictures[n], found) for found, pictures in people if found.pose is not None]
         _fit(tile, None if image is None else _tile(image, mask, drawn))
         write_text(tile, name if image is not None else f"{name}: no picture", 0, WHITE, size=height)

@@ -15,7 +15,7 @@ from shadowpuppet.body.upper_body import TWIST
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import Codes
 from shadowpuppet.camera.drawing import overlay_frame
-from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.mask import Mask, Seen, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution, RecordingError, SilhouetteError, TrackingError
 from shadowpuppet.geometry import Array, evenly_spread
@@ -131,11 +131,11 @@ class MonocularSubject(TrackedSubject):
         """How the camera sees the body."""
         return self.tracker.picture
 
-    def observe(self, masks: Sequence[Mask | None], codes: Sequence[Codes | None] = ()) -> ColouredMask:
+    def observe(self, seen: Seen) -> ColouredMask:
         """The camera's mask and its colours."""
-        (mask,) = masks
+        (mask,) = seen.masks
         assert mask is not None
-        return ColouredMask(mask, codes[0] if codes else None)
+        return ColouredMask(mask, seen.codes[0] if seen.codes else None)
 
     def next_state(self, rng: np.random.Generator, state: State | None, observation: ColouredMask) -> State | None:
         """The tracker's state after a mask; None before the first mask that is not empty."""
@@ -176,7 +176,7 @@ class MonocularSubject(TrackedSubject):
 
     def draw(self, frames: FrameSet, found: MotionFrame, last: MotionFrame | None = None) -> Image:
         """Model, matching result and raw picture, one below the other."""
-        image, mask = frames.images[0], self.observe(frames.masks).mask
+        image, mask = frames.images[0], self.observe(frames.seen).mask
         assert image is not None
         pose = np.full(len(self.body.skeleton.dofs), np.nan) if found.pose is None else np.asarray(found.pose)
         ignored = mask & self.picture.legs(pose) if found.pose is not None and self.tracker.settings.ignore_legs else None

@@ -16,8 +16,7 @@ from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.bits import Bits
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.colour_codes import Codes
-from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.camera.mask import Mask, Seen, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import HARMFUL, NOTED, Caution, SettingsError, choices
 from shadowpuppet.io.motion.motion_files import read_motion
@@ -54,11 +53,9 @@ class HullObservation(NamedTuple):
 
     points: SurfacePoints
     """Surface points of the visual hull."""
-    masks: Sequence[Mask | None]
+    seen: Seen
     people: int
     """Number of cameras in which the silhouette may be a person's."""
-    codes: Sequence[Codes | None] = ()
-    """`FrameSet.codes`."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -73,9 +70,9 @@ class MultiviewSubject(TrackedSubject):
     """The front, if silhouettes hardly show it: the pose is first searched for about it."""
     state_types = (MultiviewState, Particles, Unexplained, ColourCounts, Before, Trail)
 
-    def observe(self, masks: Sequence[Mask | None], codes: Sequence[Codes | None] = ()) -> HullObservation:
-        """Surface points of the visual hull of the masks, the masks, and their colours."""
-        return HullObservation(self.hull.points(masks), masks, sum(mask is not None and may_be_person(mask) for mask in masks), codes)
+    def observe(self, seen: Seen) -> HullObservation:
+        """Surface points of the visual hull of the masks, and what was seen."""
+        return HullObservation(self.hull.points(seen.masks), seen, sum(mask is not None and may_be_person(mask) for mask in seen.masks))
 
     def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed]:
         """Observations of frame sets; another thread makes the next one while one is tracked."""
@@ -91,12 +88,12 @@ class MultiviewSubject(TrackedSubject):
 
         After None the first pose is searched for again, once two cameras see a person.
         """
-        points, masks, people, codes = observation
+        points, seen, people = observation
         if people == 0 or (state is None and people < 2):
             return None
         if state is None:
-            return self.tracker.start(rng, points, masks, facing=None if self.front is None else self.front.heading_in(points))
-        return self.tracker.step(rng, state, points, masks, codes=codes)
+            return self.tracker.start(rng, points, seen.masks, facing=None if self.front is None else self.front.heading_in(points))
+        return self.tracker.step(rng, state, points, seen.masks, codes=seen.codes)
 
     def left_out(self, state: MultiviewState | None) -> tuple[Mask | None, ...]:
         """For each camera the pixels (H, W), at half size, that a state leaves out of the silhouettes; None for none."""
@@ -110,7 +107,7 @@ class MultiviewSubject(TrackedSubject):
 
     def doubt(self, state: MultiviewState, observation: HullObservation, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
         """Doubt about the estimate of a frame set."""
-        return self._doubt(state, observation.points, observation.masks, seconds, before)
+        return self._doubt(state, observation.points, observation.seen.masks, seconds, before)
 
     @cached_property
     def _doubt(self) -> MultiviewDoubt:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.colour_codes import Codes, colour_codes
+from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.camera.mask import Mask, Seen, half_size
 from shadowpuppet.errors import SettingsError, SilhouetteError, VideoError, warn
 from shadowpuppet.io.recording import Recording
@@ -48,7 +48,9 @@ def unshared(found: Sequence[Segmented | None]) -> tuple[Mask | None, ...]:
 
 def shown_in(found: Sequence[Segmented | None], share: Share = unshared) -> Seen:
     """What the silhouettes of a set's cameras show, with those masks that `share` makes of them."""
-    return Seen(share(found), tuple(None if each is None or each.shadow is None else half_size(each.shadow) for each in found))
+    own, masks = unshared(found), share(found)
+    shadows = tuple(None if each is None or each.shadow is None else half_size(each.shadow) for each in found)
+    return Seen(masks, shadows, own=() if all(map(operator.is_, own, masks)) else own)
 
 
 class FrameSet(NamedTuple):
@@ -57,23 +59,17 @@ class FrameSet(NamedTuple):
     time: float
     """Seconds of the recording."""
     images: tuple[Image | None, ...]
-    masks: tuple[Mask | None, ...]
-    """The person's silhouettes (H, W)."""
+    seen: Seen
+    """What they show. Colours of several cameras only where they are wanted."""
     decoding: float = 0.0
     """Seconds of reading, summed over the cameras."""
     segmenting: float = 0.0
     """Seconds of making silhouettes, likewise."""
-    own: tuple[Mask | None, ...] = ()
-    """Silhouettes (H, W) as each camera's own picture has them; empty where other cameras have added nothing to `masks`."""
     corrected: tuple[Image | None, ...] = ()
     """Images that fit the masks, in the light of the empty scene (`Segmented.image`), at half size in those of `frame_process`; empty: not
     known."""
-    shadows: tuple[Mask | None, ...] = ()
-    """As in `Seen`."""
-    codes: tuple[Codes | None, ...] = ()
-    """Coarse colours (`camera.colour_codes`) of these images; of several cameras only where they are wanted."""
     points: SurfacePoints | None = None
-    """Surface points of the visual hull of `masks`; None: not computed."""
+    """Surface points of the visual hull of the silhouettes; None: not computed."""
     carving: float = 0.0
     """Seconds of computing them."""
 
@@ -169,8 +165,8 @@ def _single_frames(rig: Rig, segment: Segment, ready: bool, every: int) -> Gener
             return
         decoded = time.perf_counter()
         found = segment(frame)
-        codes = colour_codes(found.image)
-        yield FrameSet(frame.time, (frame.image,), (found.mask,), decoded - start, time.perf_counter() - decoded, codes=(codes,))
+        seen = Seen((found.mask,), codes=(colour_codes(found.image),))
+        yield FrameSet(frame.time, (frame.image,), seen, decoded - start, time.perf_counter() - decoded)
 
 
 def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = False, every: int = 1,
@@ -205,12 +201,11 @@ def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = F
                 continue
             start = time.perf_counter()
             found = [part.segmented for part in parts]
-            own, (masks, shadows) = unshared(found), shown_in(found, share)
+            seen = shown_in(found, share)
             sharing = time.perf_counter() - start
-            yield FrameSet(moment, tuple(part.image for part in parts), masks,
+            yield FrameSet(moment, tuple(part.image for part in parts), seen,
                            sum(part.decoding for part in parts), sum(part.segmenting for part in parts) + sharing,
-                           () if all(map(operator.is_, own, masks)) else own,
-                           tuple(None if each is None else each.image for each in found), shadows)
+                           tuple(None if each is None else each.image for each in found))
 
 
 class _Part(NamedTuple):

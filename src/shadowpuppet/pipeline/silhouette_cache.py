@@ -6,7 +6,7 @@ They depend on neither the seed nor the tracker, and take most of the time of ru
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.colour_codes import Codes, thinned
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.rig import FrameSet, Rig
@@ -47,16 +47,17 @@ class MaskStore:
     complete: bool = False
     """Whether all frame sets of the recording are stored."""
     sets: list[tuple[float, list[Packed | None], list[Packed | None], list[bytes | None]]] = field(default_factory=list)
-    """For each set its time (s) and, for each camera, `FrameSet.masks`, `FrameSet.own` and, where the mask is, `FrameSet.codes`; None for a
-    camera without them."""
+    """For each set its time (s) and, for each camera, `Seen.masks`, `Seen.own` and, where the mask is, `Seen.codes`; None for a camera
+    without them."""
 
-    def add(self, time: float, masks: Sequence[Mask | None], own: Sequence[Mask | None] = (), codes: Sequence[Codes | None] = ()) -> None:
-        """Store one frame set's masks, and the colours in them."""
+    def add(self, time: float, seen: Seen) -> None:
+        """Store one frame set's masks, and the colours in them; not the shadows."""
         if self.size > self.limit:
             self.sets.clear()
             return
-        packed, alone = ([None if mask is None else (_compressed(np.packbits(mask)), mask.shape) for mask in each] for each in (masks, own))
-        colours = [None if mask is None or each is None else _compressed(each[thinned(mask)]) for mask, each in zip(masks, codes)]
+        packed, alone = ([None if mask is None else (_compressed(np.packbits(mask)), mask.shape) for mask in each]
+                         for each in (seen.masks, seen.own))
+        colours = [None if mask is None or each is None else _compressed(each[thinned(mask)]) for mask, each in zip(seen.masks, seen.codes)]
         self.sets.append((time, packed, alone, colours))
         self.size += sum(len(one[0]) for one in (*packed, *alone) if one is not None)
         self.size += sum(len(one) for one in colours if one is not None)
@@ -72,12 +73,13 @@ class MaskStore:
     def _frame_set(self, n: int) -> FrameSet:
         time, packed, alone, colours = self.sets[n]
         masks = tuple(map(_unpacked, packed))
-        return FrameSet(time, (None,) * len(packed), masks, own=tuple(map(_unpacked, alone)), codes=tuple(map(_codes, masks, colours)))
+        seen = Seen(masks, codes=tuple(map(_codes, masks, colours)), own=tuple(map(_unpacked, alone)))
+        return FrameSet(time, (None,) * len(packed), seen)
 
     def stored(self, frames: Iterable[FrameSet]) -> Generator[FrameSet]:
         """Pass frame sets on, and store their masks."""
         for each in frames:
-            self.add(each.time, each.masks, each.own, each.codes)
+            self.add(each.time, each.seen)
             yield each
         self.complete = self.size <= self.limit
 

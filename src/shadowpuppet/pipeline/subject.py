@@ -17,8 +17,7 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.camera.bits import Bits
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.colour_codes import Codes
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.errors import Caution
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person
@@ -81,8 +80,8 @@ class TrackedSubject(ABC):
     """The named tuples in the tracker's state and in what the doubt about the next frame needs."""
 
     @abstractmethod
-    def observe(self, masks: Sequence[Mask | None], codes: Sequence[Codes | None] = ()) -> Any:
-        """The tracker's observation of one frame set's silhouettes, and of their colours (`FrameSet.codes`)."""
+    def observe(self, seen: Seen) -> Any:
+        """The tracker's observation of what one frame set shows."""
 
     @abstractmethod
     def next_state(self, rng: np.random.Generator, state: Any, observation: Any) -> Any:
@@ -100,7 +99,7 @@ class TrackedSubject(ABC):
         """Observations of frame sets, one after another."""
         for each in frames:
             start = time.perf_counter()
-            observation = self.observe(each.masks, each.codes)
+            observation = self.observe(each.seen)
             yield Observed(each, observation, time.perf_counter() - start)
 
     @property

@@ -185,11 +185,11 @@ def _backward(writer: RunWriter, subject: TrackedSubject, options: Options, list
     listener.begin("tracking backward", len(motion))
     start, rng = time.perf_counter(), np.random.default_rng(options.seed).spawn(3)[2]  # not that of the look or of the forward pass
     state = before = None
-    for seen in reversed(store):
-        observation = subject.observe(seen.masks, seen.codes)
+    for now in reversed(store):
+        observation = subject.observe(now.seen)
         state = subject.next_state(rng, state, observation)
-        found, before = motion_frame(subject, -seen.time, state, observation, before)
-        frames.append(found._replace(time=seen.time))
+        found, before = motion_frame(subject, -now.time, state, observation, before)
+        frames.append(found._replace(time=now.time))
         listener.advance(len(frames))
     builder = MotionBuilder(motion.body_name, motion.dof_names, motion.joint_names)
     for found in reversed(frames):
@@ -200,10 +200,10 @@ def _backward(writer: RunWriter, subject: TrackedSubject, options: Options, list
     return both
 
 
-def _steadied(seen: FrameSet, silhouettes: Sequence[Silhouettes]) -> FrameSet:
+def _steadied(now: FrameSet, silhouettes: Sequence[Silhouettes]) -> FrameSet:
     """A frame set with the images of cameras that stand still."""
-    images = (None if image is None else each.steadied(image) for each, image in zip(silhouettes, seen.images))
-    return seen._replace(images=tuple(images))
+    images = (None if image is None else each.steadied(image) for each, image in zip(silhouettes, now.images))
+    return now._replace(images=tuple(images))
 
 
 class Carried(NamedTuple):
@@ -251,30 +251,30 @@ def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, 
             frames = stack.enter_context(closing(frames_beside(task)))
             if cache is not None:
                 frames = stack.enter_context(closing(cache.frames(frames, options)))
-            frames = (seen._replace(masks=watch(seen.time, seen.masks, seen.own)) for seen in frames)
+            frames = (now._replace(seen=watch(now.time, now.seen)) for now in frames)
             if store is not None:
                 frames = stack.enter_context(closing(store.stored(frames)))
-            for found, seen in zip(earlier, frames):
+            for found, now in zip(earlier, frames):
                 watch.tracked(subject.drawn(found))
-                leans.append(subject.lean(found, seen.masks))
+                leans.append(subject.lean(found, now.seen.masks))
                 last = last if found.status in BLANK else found
                 if overlay is not None:
-                    overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found, last))
+                    overlay.write(subject.draw(_steadied(now, survey.silhouettes), found, last))
             observed = stack.enter_context(closing(subject.observations(frames)))
-            for seen, observation, seconds in timer.each("wait", observed):
-                timer.add(decode=seen.decoding, segment=seen.segmenting, hull=seconds)
+            for now, observation, seconds in timer.each("wait", observed):
+                timer.add(decode=now.decoding, segment=now.segmenting, hull=seconds)
                 with timer.time("track"):
                     state = subject.next_state(rng, state, observation)
                     watch.tracked(subject.drawn(state))
-                left_out = add_left_out(left_out, seen.time, subject.left_out(state))
+                left_out = add_left_out(left_out, now.time, subject.left_out(state))
                 with timer.time("doubt"):
-                    found, before = motion_frame(subject, seen.time, state, observation, before)
-                leans.append(subject.lean(found, seen.masks))
+                    found, before = motion_frame(subject, now.time, state, observation, before)
+                leans.append(subject.lean(found, now.seen.masks))
                 last = last if found.status in BLANK else found
                 with timer.time("write"):
                     writer.write(found)
                     if overlay is not None:
-                        overlay.write(subject.draw(_steadied(seen, survey.silhouettes), found, last))
+                        overlay.write(subject.draw(_steadied(now, survey.silhouettes), found, last))
                     carried = Carried(look, rng.bit_generator.state, subject.kept(state), before, left_out)
                     checkpoints.keep(partial(writer.checkpoint, carried))
                 count += 1

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.geometry import Array
 from shadowpuppet.pipeline.person_rig import HullObservation, MultiviewSubject
 from shadowpuppet.tracking.multiview.tracker import MultiviewState
@@ -94,5 +94,5 @@ class Member:
     def observation(self) -> HullObservation:
         """This person's part of the last frame."""
         assert self.share is not None
-        seen = sum(mask is not None and bool(mask.any()) for mask in self.share.masks)
-        return HullObservation(self.share.points, self.share.masks, seen)
+        cameras = sum(mask is not None and bool(mask.any()) for mask in self.share.masks)
+        return HullObservation(self.share.points, Seen(tuple(self.share.masks)), cameras)

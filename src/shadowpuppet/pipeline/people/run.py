@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.bits import Bits
-from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError
 from shadowpuppet.io.people import open_places, person_folder, write_place
 from shadowpuppet.io.run import read_run
@@ -147,12 +146,12 @@ class PeopleRun:
         """The silhouettes of some stretches, read again, without those of cameras that were set aside."""
         segment, last, found = [each.following() for each in self.survey.silhouettes], max(each.until for each in wanted), list[Packed]()
         with closing(read_frames(self.rig, segment, ready=self.options.masks, every=self.options.every)) as frames:
-            for seen in frames:
-                if seen.time >= last:
+            for now in frames:
+                if now.time >= last:
                     break
-                if any(each.begin - 1e-6 <= seen.time < each.until for each in wanted):
-                    aside = {each.camera for each in self.aside if each.begin <= seen.time <= each.end}
-                    found.append(packed(seen.time, [None if n in aside else mask for n, mask in enumerate(seen.masks)]))
+                if any(each.begin - 1e-6 <= now.time < each.until for each in wanted):
+                    aside = {each.camera for each in self.aside if each.begin <= now.time <= each.end}
+                    found.append(packed(now.time, [None if n in aside else mask for n, mask in enumerate(now.seen.masks)]))
         return found
 
     def _finished(self, number: int, truth: Path | None) -> dict[str, Any]:
@@ -211,34 +210,33 @@ class PeopleRun:
         clear = [] if carried is None else carried.clear.tolist()
         earlier = iter(self._earlier(group, carried, stack))
 
-        def judged(seen: FrameSet, found: Mapping[int, MotionFrame], is_clear: bool) -> None:
+        def judged(now: FrameSet, found: Mapping[int, MotionFrame], is_clear: bool) -> None:
             subjects = {n: group.members[n - 1].subject_at(frame.time) for n, frame in found.items()}
             drawn = [subjects[n].drawn(frame) for n, frame in found.items()]
             watch.tracked(_together(drawn) if is_clear else ())
             if overlay is not None:
-                overlay.write(overlay_of_people(seen, [(n, frame, subjects[n].pictures) for n, frame in found.items()]))
+                overlay.write(overlay_of_people(now, [(n, frame, subjects[n].pictures) for n, frame in found.items()]))
 
         try:
-            for seen in timer.each("wait", frames):
-                masks = watch(seen.time, seen.masks, seen.own)
+            for now in timer.each("wait", frames):
+                seen = watch(now.time, now.seen)
                 if (known := next(earlier, None)) is not None:
-                    judged(seen, *known)
+                    judged(now, *known)
                     continue
-                timer.add(decode=seen.decoding, segment=seen.segmenting, hull=seen.carving)
+                timer.add(decode=now.decoding, segment=now.segmenting, hull=now.carving)
                 with timer.time("hull"):
-                    points = seen.points
-                    if points is None or not all(map(operator.is_, masks, seen.masks)):
-                        points = group.hull.points(masks)
-                    shown = Seen(tuple(masks), seen.shadows)
+                    points = now.points
+                    if points is None or not all(map(operator.is_, seen.masks, now.seen.masks)):
+                        points = group.hull.points(seen.masks)
                 with timer.time("track"):
                     if not begun and len(points.points):
                         begun = True
-                        group.start(seen.time, points, shown)
-                    group.next(seen.time, points, shown, seen.corrected if options.appearance else ())
+                        group.start(now.time, points, seen)
+                    group.next(now.time, points, seen, now.corrected if options.appearance else ())
                 with timer.time("write"):
-                    found = self._write(group, seen, stack, places)
+                    found = self._write(group, now, stack, places)
                     clear.append(group.is_clear)
-                    judged(seen, found, clear[-1])
+                    judged(now, found, clear[-1])
                     checkpoints.keep(partial(self._keep, group, places, clear, begun))
                 self.listener.advance(len(clear))
         finally:
@@ -269,16 +267,16 @@ class PeopleRun:
         limbs = None if frame.limb_status is None else ["uncertain" if status == "tracked" else status for status in frame.limb_status]
         return frame._replace(status="uncertain" if frame.status == "tracked" else frame.status, limb_status=limbs)
 
-    def _write(self, group: Group, seen: FrameSet, stack: ExitStack, places: BinaryIO) -> dict[int, MotionFrame]:
+    def _write(self, group: Group, now: FrameSet, stack: ExitStack, places: BinaryIO) -> dict[int, MotionFrame]:
         """Write a frame of each person found so far."""
         found = dict[int, MotionFrame]()
         for member in group.members:
             if member.state is None and member.number not in self.writers:
                 continue
             if member.state is None or member.share is None:
-                frame, member.before = MotionFrame(seen.time, "absent"), None
+                frame, member.before = MotionFrame(now.time, "absent"), None
             else:
-                frame, member.before = motion_frame(member.subject, seen.time, member.state, member.observation, member.before)
+                frame, member.before = motion_frame(member.subject, now.time, member.state, member.observation, member.before)
                 doubted = group.identity.is_doubted(member.number)
                 if not member.facing.is_known:
                     would_be = self._doubted(frame) if doubted else frame
@@ -286,11 +284,11 @@ class PeopleRun:
                 if doubted or not member.is_front_sure:
                     frame = self._doubted(frame)
             self._writer(member, stack).write(frame)
-            if member.measured_at == seen.time:
+            if member.measured_at == now.time:
                 self._write_person(member)
             here = frame.status not in ("absent", "lost") and member.state is not None
             place = place_of(member.subject.body, member.state) if here and member.state is not None else np.full(2, np.nan)
-            write_place(places, seen.time, member.number, frame.status, place)
+            write_place(places, now.time, member.number, frame.status, place)
             found[member.number] = frame
         places.flush()
         return found

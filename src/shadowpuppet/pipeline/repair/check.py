@@ -113,7 +113,7 @@ def gather_silhouettes(rig: Rig, options: Options, listener: Listener, whole: bo
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when a run comes to it
         for n, each in enumerate(synchronized_frames(rig, segments, ready=options.masks, every=every, threads=usable_cores())):
-            row = silhouettes_of(each.masks)
+            row = silhouettes_of(each.seen.masks)
             if rows or sum(silhouette is not None for silhouette in row) > 1:
                 rows.append(row)
                 listener.advance(len(rows))

@@ -66,6 +66,6 @@ def _read_sets(rig: Rig, silhouettes: Sequence[Silhouettes], opening: Opening, r
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when the run comes to it
         frames = synchronized_frames(rig, [each.segmented for each in silhouettes], ready=ready, every=opening.every,
                                      threads=usable_cores(), share=SharedShadows(rig.cameras))
-        sets = [(each.time, each.masks, each.shadows) for each in islice(frames, opening.number)]
+        sets = [(each.time, each.seen) for each in islice(frames, opening.number)]
     sets = [each for each in sets if each[0] <= rig.recording.begin + opening.seconds] or sets[:1]
-    return FirstSeconds([time for time, _, _ in sets], [masks for _, masks, _ in sets], shadows=[shadows for _, _, shadows in sets])
+    return FirstSeconds([time for time, _ in sets], [seen.masks for _, seen in sets], shadows=[seen.shadows for _, seen in sets])

@@ -34,7 +34,7 @@ AHEAD = 2
 """Number of frames after which a verdict counts; one less may be read before the first of them is tracked."""
 
 
-class Seen(NamedTuple):
+class TrackedSet(NamedTuple):
     """A tracked frame set."""
 
     seconds: float
@@ -57,7 +57,7 @@ class StepWatch:
         self.aside = SetAside(number)
         self._short = tuple(short) or (False,) * number
         self._read = deque[tuple[float, tuple[Bits | None, ...]]]()
-        self._seen = deque[Seen]()
+        self._seen = deque[TrackedSet]()
         self._verdicts = deque[tuple[str, ...]]([("",) * number] * AHEAD)
         self._gain, self._change, self._misfit = np.zeros((3, number, 2 * len(LAGS)))
         self._out = [""] * number
@@ -78,10 +78,10 @@ class StepWatch:
         if not drawn:
             self._seen.clear()
         elif not self._seen or seconds - self._seen[-1].seconds >= PACE:
-            self._compare(Seen(seconds, masks, tuple(drawn)))
+            self._compare(TrackedSet(seconds, masks, tuple(drawn)))
         self._verdicts.append(self._verdict())
 
-    def _compare(self, now: Seen) -> None:
+    def _compare(self, now: TrackedSet) -> None:
         """Add what a frame set shows."""
         fade = np.exp((self._seen[-1].seconds - now.seconds) / MEMORY) if self._seen else 1.0
         for sums in (self._gain, self._change, self._misfit):
@@ -98,7 +98,7 @@ class StepWatch:
         while now.seconds - self._seen[0].seconds > LAGS[-1] + PACE:
             self._seen.popleft()
 
-    def _evidence(self, now: Seen, camera: int, mask: Bits) -> Array:
+    def _evidence(self, now: TrackedSet, camera: int, mask: Bits) -> Array:
         """What a silhouette shows of each lag, late and early: by how much the other body explains it better and by how much bodies differ,
         both over its area, and what the other body leaves unexplained, times the difference (3, 2 x LAGS)."""
         found, area = np.zeros((3, 2, len(LAGS))), count(mask)
@@ -113,7 +113,7 @@ class StepWatch:
             found[2, :, k] = left * found[1, :, k]
         return found.reshape(3, -1)
 
-    def _at(self, seconds: float) -> Seen | None:
+    def _at(self, seconds: float) -> TrackedSet | None:
         """The frame set nearest to a time (s); None if none is within a frame's time."""
         nearest = min(self._seen, key=lambda each: abs(each.seconds - seconds), default=None)
         return nearest if nearest is not None and abs(nearest.seconds - seconds) < 0.035 else None

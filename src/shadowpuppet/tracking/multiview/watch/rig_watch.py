@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shadowpuppet.camera.bits import Bits
-from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.tracking.frozen import CameraWatch, Interval, is_blind
 from shadowpuppet.tracking.multiview.watch.out_of_step import StepWatch
 
 
 class RigWatch:
-    """Sets cameras aside that are frozen, blind or out of step, and takes them back: `watch(seconds, masks)` has None in place of their
+    """Sets cameras aside that are frozen, blind or out of step, and takes them back: `watch(seconds, seen)` has None in place of their
     masks. `tracked` follows for each frame set, in the same order. Of one camera it notes when it is blind."""
 
     def __init__(self, number: int, short: Sequence[bool] = ()) -> None:
@@ -19,17 +19,15 @@ class RigWatch:
         self._watch, self._steps = CameraWatch(number), StepWatch(number, short)
         self._many = number > 1
 
-    def __call__(self, seconds: float, masks: Sequence[Mask | None], own: Sequence[Mask | None] = ()) -> tuple[Mask | None, ...]:
-        """The masks (H, W) of a frame set at a time (s), None for a camera without a picture or one that is set aside. A single camera is
-        never set aside: when it is blind is only noted.
-
-        own: masks as each camera's own picture has them, where other cameras have added to `masks`. A frozen picture's stay alike.
-        """
+    def __call__(self, seconds: float, seen: Seen) -> Seen:
+        """What is seen in a frame set at a time (s), without the masks of cameras that are set aside. A single camera is never set aside:
+        when it is blind is only noted. A frozen picture's own masks stay alike, whatever other cameras add to them."""
+        masks, own = seen.masks, seen.own
         if not self._many:
             self._watch.aside.note(seconds, ["blind" if is_blind(mask) else "" for mask in masks])
-            return tuple(masks)
+            return seen
         kept = self._steps(seconds, self._watch(seconds, own or masks))
-        return tuple(None if of_own is None else mask for of_own, mask in zip(kept, masks, strict=True))
+        return seen._replace(masks=tuple(None if of_own is None else mask for of_own, mask in zip(kept, masks, strict=True)))
 
     def tracked(self, drawn: Sequence[Bits]) -> None:
         """The body of the first frame set that has none yet, as `StepWatch.tracked` expects it."""
