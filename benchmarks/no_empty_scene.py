@@ -25,7 +25,7 @@ from rich.table import Table
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage, chosen_views, open_recording, take_sample
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.prepare import kind_of
+from shadowpuppet.pipeline.prepare import MONOCULAR, MULTIVIEW
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
@@ -97,7 +97,7 @@ def joint_row(path: Path, folder: Path) -> list[str]:
         rig = open_rig(path, options)
         if name == "without":
             rig = replace(rig, footage=tuple(replace(each, view=replace(each.view, background=None)) for each in rig.footage))
-        done = run(rig, kind_of(rig), folder / f"{path.name}_{name}", options, Listener())
+        done = run(rig, MULTIVIEW if rig.is_multiview else MONOCULAR, folder / f"{path.name}_{name}", options, Listener())
         found.append(done.metrics["errors"]["mean_mm"])
     return [path.name, *(f"{error:.1f}" for error in found), f"{found[1] / found[0]:.2f}"]
 

@@ -8,7 +8,7 @@ from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.subject import TrackedSubject, motion_frame
+from shadowpuppet.pipeline.subject import Before, Observation, State, TrackedSubject, motion_frame
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 from shadowpuppet.tracking.smoothing.fixed_lag import FixedLag
@@ -40,6 +40,30 @@ Images = tuple[Image | None, ...]
 """Each camera's picture; None of one that has none at that moment."""
 Masks = tuple[Mask | None, ...]
 """Each camera's silhouette (H, W), likewise."""
+
+
+class Moment(Protocol):
+    """What a session needs to know of a picture, or of a set of pictures."""
+
+    @property
+    def captured(self) -> float:
+        """Time of capture, seconds of the monotonic clock."""
+        ...
+
+    @property
+    def shown(self) -> float | None:
+        """Time in the film, seconds; None for cameras."""
+        ...
+
+    @property
+    def number(self) -> int:
+        """Number of pictures, or of sets, before it."""
+        ...
+
+
+Shot = TypeVar("Shot", bound=Moment)
+"""A picture of one camera, or a set of pictures of several."""
+Result = TypeVar("Result")
 
 
 class Outcome(NamedTuple):
@@ -71,13 +95,13 @@ class _Waiting(NamedTuple):
     masks: Masks
 
 
-def at_once(task: Callable[[], Any]) -> Callable[[], Any]:
+def at_once(task: Callable[[], Result]) -> Callable[[], Result | None]:
     """Do a task now; returns a function that returns its result."""
     return partial(lambda result: result, task())
 
 
 @dataclass(eq=False)
-class LiveSession(ABC):
+class LiveSession(ABC, Generic[Shot, State, Observation, Before]):
     """State of a session. Call `step` with every picture (or set of pictures), and `idle` if none came."""
 
     options: Options
@@ -91,14 +115,16 @@ class LiveSession(ABC):
     """Starts a long task; returns a function that returns the result, or None while it is not ready."""
     phase: str = "learning"
     """One of `PHASES`."""
-    subject: TrackedSubject | None = None
+    subject: TrackedSubject[State, Observation, Before] | None = None
     """The measured person; None before."""
     trouble: str = ""
     """Why no pictures come; empty while they do."""
 
     def __post_init__(self) -> None:
         """Set the state before the first picture."""
-        self._began, self._lost_since, self._new, self._state, self._before = np.nan, np.nan, False, None, None
+        self._began, self._lost_since, self._new = np.nan, np.nan, False
+        self._state: State | None = None
+        self._before: Before | None = None
         self._lagging: FixedLag | None = None
         """Smooths the frames; None without a lag, and before there is a person."""
         self._waiting = dict[float, _Waiting]()
@@ -117,7 +143,7 @@ class LiveSession(ABC):
 
     # Input
 
-    def step(self, shot: Any) -> Outcome:
+    def step(self, shot: Shot) -> Outcome:
         """Process a picture, or a set of pictures. Raises `SilhouetteError` if the background cannot be learnt."""
         self._began = shot.captured if np.isnan(self._began) else self._began
         if trouble := self.check(shot):
@@ -171,7 +197,7 @@ class LiveSession(ABC):
         """Pictures of each camera's empty scene, of the working size."""
 
     @abstractmethod
-    def check(self, shot: Any) -> str:
+    def check(self, shot: Shot) -> str:
         """The problem of a picture, in a sentence; empty if there is none."""
 
     @abstractmethod
@@ -195,26 +221,26 @@ class LiveSession(ABC):
         """Start waiting for a person."""
 
     @abstractmethod
-    def _scaled(self, shot: Any) -> Images: ...
+    def _scaled(self, shot: Shot) -> Images: ...
 
     @abstractmethod
-    def _see(self, shot: Any, images: Any) -> Seen: ...
+    def _see(self, shot: Shot, images: Images) -> Seen: ...
 
     @abstractmethod
-    def _learn(self, shot: Any, images: Any) -> Outcome: ...
+    def _learn(self, shot: Shot, images: Images) -> Outcome: ...
 
     @abstractmethod
-    def _wait(self, shot: Any, images: Any) -> Outcome: ...
+    def _wait(self, shot: Shot, images: Images) -> Outcome: ...
 
     @abstractmethod
-    def _measure(self, shot: Any, images: Any) -> Outcome: ...
+    def _measure(self, shot: Shot, images: Images) -> Outcome: ...
 
     @abstractmethod
-    def _shown(self, images: Any, masks: Any, frame: MotionFrame | None) -> dict[str, Any]:
+    def _shown(self, images: Images, masks: Masks, frame: MotionFrame | None) -> dict[str, Any]:
         """The fields image, mask and picture of a `View`."""
 
     @abstractmethod
-    def _message(self, masks: Any) -> tuple[str, float | None]:
+    def _message(self, masks: Masks) -> tuple[str, float | None]:
         """Instruction to the person, and the seconds of a countdown or None."""
 
     @abstractmethod
@@ -223,7 +249,7 @@ class LiveSession(ABC):
 
     # Shared by all sessions
 
-    def _track(self, shot: Any, images: Any) -> Outcome:
+    def _track(self, shot: Shot, images: Images) -> Outcome:
         assert self.subject is not None
         seen = self._see(shot, images)
         masks, observation = seen.masks, self.subject.observe(seen if self._watch is None else self._watch(shot.captured, seen))
@@ -261,7 +287,7 @@ class LiveSession(ABC):
         now = self.clock()
         return tuple(Given(frame, now - self._waiting.pop(frame.time).captured) for frame in frames)
 
-    def _begin_tracking(self, subject: TrackedSubject) -> None:
+    def _begin_tracking(self, subject: TrackedSubject[State, Observation, Before]) -> None:
         self.subject, self.phase, self._state, self._before, self._new = subject, "tracking", None, None, True
         self._lagging = FixedLag(MotionSmoother(subject.body.skeleton, subject.joints), self.lag) if self.lag else None
         self.timing.pause()

@@ -24,13 +24,15 @@ from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.motion import BLANK, MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, worked_size
 from shadowpuppet.pipeline.overlay_video import overlay_grid
-from shadowpuppet.pipeline.person_rig import MultiviewSubject, check_body, fit_in_views
+from shadowpuppet.pipeline.person_rig import HullObservation, MultiviewSubject, check_body, fit_in_views
 from shadowpuppet.pipeline.rig import FrameSet, Segment, shown_in
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body
 from shadowpuppet.pipeline.survey.opening import OPENED, OPENING
+from shadowpuppet.tracking.doubt.multiview import Before
 from shadowpuppet.tracking.frozen import LEAST
 from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
+from shadowpuppet.tracking.multiview.tracker import MultiviewState
 from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 from shadowpuppet.video import Image
 
@@ -50,7 +52,7 @@ def _before(scenes: Iterable[EmptyScene], task: Task, films: Sequence[list[Image
 
 
 @dataclass(eq=False, kw_only=True)
-class RigSession(LiveSession):
+class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Before]):
     """A live session with several cameras."""
 
     full: tuple[Camera, ...]
@@ -225,7 +227,7 @@ class RigSession(LiveSession):
             self._begin_tracking(found)
         return Outcome(self._view(images))
 
-    def _begin_tracking(self, subject: TrackedSubject) -> None:
+    def _begin_tracking(self, subject: TrackedSubject[MultiviewState, HullObservation, Before]) -> None:
         super()._begin_tracking(subject)
         self._watch = RigWatch(len(self.full))
 

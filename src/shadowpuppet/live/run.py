@@ -34,7 +34,7 @@ from shadowpuppet.live.warm_up import warm_up
 from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.pipeline.options import Options, plain_options
-from shadowpuppet.pipeline.subject import TrackedSubject, average_body, joint_names
+from shadowpuppet.pipeline.subject import FittedPerson, average_body, joint_names
 from shadowpuppet.pipeline.track import smooth_run
 from shadowpuppet.settings import validate
 from shadowpuppet.threads import one_blas_thread
@@ -94,7 +94,7 @@ class _Live:
         self.session, self.capture, self.rate, self.is_live = self._several() if is_rig(settings.camera) else self._single()
         self.recorder = Recorder(run.folder / "recording", self.session.worked_cameras, self.rate) if settings.record else None
         self.frames, self.breaks, self.broke, self.said = 0, 0, np.nan, ""
-        self.subjects = list[tuple[int, TrackedSubject]]()
+        self.subjects = list[tuple[int, FittedPerson]]()
         """Measured persons, each with its first frame."""
 
     def _single(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
@@ -198,7 +198,7 @@ class _Live:
             self.recorder.write(outcome.frame.time, outcome.images, self.session.scenes, self._person.person.height)
 
     @property
-    def _person(self) -> TrackedSubject:
+    def _person(self) -> FittedPerson:
         assert self.session.subject is not None
         return self.session.subject
 

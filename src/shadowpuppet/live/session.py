@@ -5,26 +5,28 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import colour_codes
-from shadowpuppet.camera.mask import Mask, Seen
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.person import Person
-from shadowpuppet.live.base_session import LiveSession, Outcome, scaled
+from shadowpuppet.live.base_session import Images, LiveSession, Masks, Outcome, scaled
 from shadowpuppet.live.first_look import EmptyScene, Found, Task, look, look_at
 from shadowpuppet.live.phases import BackgroundCollector, StandStillDetector, unfit
 from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.footage import CameraFrame, region_of, worked_size
-from shadowpuppet.pipeline.person import MonocularSubject
+from shadowpuppet.pipeline.person import ColouredMask, MonocularSubject
 from shadowpuppet.pipeline.rig import Segment
 from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.tracking.doubt.monocular import Before
 from shadowpuppet.tracking.monocular.initialization import SizeFit, find_person
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
+from shadowpuppet.tracking.monocular.tracker import State
 from shadowpuppet.video import Image
 from shadowpuppet.video.live_source import Snapshot
 
@@ -34,10 +36,11 @@ FIRST_REFINED, LAST_REFINED = 3.0, 60.0
 """Seconds of tracking after which scene and person are found again in all pictures so far; doubled each time, up to the last."""
 GAIN = 0.01
 """Overlap that a person found again must gain."""
+Value = TypeVar("Value")
 
 
 @dataclass(eq=False, kw_only=True)
-class Session(LiveSession):
+class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
     """A live session with one camera."""
 
     full: Camera
@@ -122,21 +125,20 @@ class Session(LiveSession):
         self._still, self._recent = StandStillDetector(self.settings.still), []
         self._still.message = message or self._still.message
 
-    def _learn(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
-        if self._collector.see(shot.captured, images[0]):
+    def _learn(self, shot: Snapshot, images: Images) -> Outcome:
+        if self._collector.see(shot.captured, only(images)):
             task = self._task(self.person)
             task = task if self.fit is None else task._replace(fit=None)
             self.phase, self._measured = "measuring", self.work(partial(look, task, list(self._collector.pictures.kept)))
         return Outcome(self._view(images))
 
-    def _wait(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
+    def _wait(self, shot: Snapshot, images: Images) -> Outcome:
         if self._taken():
             return Outcome(self._view(images))
-        (mask,) = masks = self._see(shot, images).masks
-        assert mask is not None
-        self._recent = [*self._recent[-7:], images[0]]
-        self._collector.pictures.add(shot.captured, images[0])
-        ready = self._still.see(shot.captured, mask)
+        masks = self._see(shot, images).masks
+        self._recent = [*self._recent[-7:], only(images)]
+        self._collector.pictures.add(shot.captured, only(images))
+        ready = self._still.see(shot.captured, only(masks))
         if ready is not None:
             assert self._scene is not None
             self.phase, self._refined = "measuring", None
@@ -146,7 +148,7 @@ class Session(LiveSession):
             self._look_again(shot.captured)
         return Outcome(self._view(images, masks))
 
-    def _measure(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
+    def _measure(self, shot: Snapshot, images: Images) -> Outcome:
         """Check whether the task is ready."""
         found: Found | None = self._measured()
         if found is None:
@@ -162,13 +164,13 @@ class Session(LiveSession):
             self._wait_again("no person's shape: stand whole in the picture, facing the camera" if found.tried else "")
         return Outcome(self._view(images))
 
-    def _track(self, shot: Snapshot, images: tuple[Image, ...]) -> Outcome:
+    def _track(self, shot: Snapshot, images: Images) -> Outcome:
         lagging = self._lagging
         given = () if not self._taken() or lagging is None else self._aged(lagging.rest())
         outcome = super()._track(shot, images)
         outcome = outcome._replace(given=(*given, *outcome.given))
         if outcome.frame is not None and outcome.frame.status == "tracked":
-            self._collector.pictures.add(shot.captured, images[0])
+            self._collector.pictures.add(shot.captured, only(images))
         self._look_again(shot.captured)
         return outcome
 
@@ -220,13 +222,13 @@ class Session(LiveSession):
     def _scaled(self, shot: Snapshot) -> tuple[Image, ...]:
         return (scaled(shot.image, self.camera),)
 
-    def _see(self, shot: Snapshot, images: tuple[Image, ...]) -> Seen:
+    def _see(self, shot: Snapshot, images: Images) -> Seen:
         """The silhouette (H, W); before tracking a clean one, as measuring a person needs."""
         clean = None if self._clean is None else self._clean.segmented
         segment = self._segment if self.phase == "tracking" else clean
         if segment is None:
             return Seen(())
-        found = segment(CameraFrame(shot.captured, images[0], None))
+        found = segment(CameraFrame(shot.captured, only(images), None))
         return Seen((found.mask,), codes=(colour_codes(found.image),))
 
     def _forget_time(self) -> None:
@@ -234,16 +236,23 @@ class Session(LiveSession):
             self._collector.wait()
         self._still.wait()
 
-    def _shown(self, images: tuple[Image, ...], masks: tuple[Mask, ...], frame: MotionFrame | None) -> dict[str, Any]:
+    def _shown(self, images: Images, masks: Masks, frame: MotionFrame | None) -> dict[str, Any]:
         picture = self.subject.picture if isinstance(self.subject, MonocularSubject) else None
-        return {"image": images[0] if images else None, "mask": masks[0] if masks else None, "picture": picture}
+        return {"image": only(images) if images else None, "mask": masks[0] if masks else None, "picture": picture}
 
-    def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
+    def _message(self, masks: Masks) -> tuple[str, float | None]:
         if self.phase == "tracking":
-            hint = unfit(masks[0]) if masks else ""
+            hint = unfit(only(masks)) if masks else ""
             gone = "the body does not fit any more: measure again" if self._gone else ""
             return hint if hint.startswith("nearly all") else gone, None
         if self.phase == "learning":
             return self._collector.message, self._collector.left
         looking = "measuring: one moment" if self._scene is not None else "finding the empty scene, and measuring who is there"
         return self._still.message if self.phase == "waiting" else looking, None
+
+
+def only(every: Sequence[Value | None]) -> Value:
+    """What the only camera has."""
+    (value,) = every
+    assert value is not None
+    return value

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -87,7 +87,7 @@ class ColouredMask(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class MonocularSubject(TrackedSubject):
+class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
     """A fitted person seen by one camera, and the tracker."""
 
     fit: SizeFit
@@ -143,7 +143,7 @@ class MonocularSubject(TrackedSubject):
             return self.tracker.start(rng, observation.mask)._replace(colours=self.colours) if observation.mask.any() else None
         return self.tracker.step(rng, state, observation.mask, codes=observation.codes)
 
-    def turned_back(self, state: State | None) -> MonocularSubject:
+    def turned_back(self, state: State | None) -> Self:
         """See `TrackedSubject`; it knows the arms' colours."""
         return self if state is None else replace(self, colours=state.colours)
 

@@ -59,7 +59,7 @@ class HullObservation(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class MultiviewSubject(TrackedSubject):
+class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
     """A fitted person seen by several cameras, and the tracker."""
 
     tracker: MultiviewTracker
@@ -74,7 +74,7 @@ class MultiviewSubject(TrackedSubject):
         """Surface points of the visual hull of the masks, and what was seen."""
         return HullObservation(self.hull.points(seen.masks), seen, sum(mask is not None and may_be_person(mask) for mask in seen.masks))
 
-    def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed]:
+    def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed[HullObservation]]:
         """Observations of frame sets; another thread makes the next one while one is tracked."""
         source = super().observations(frames)
         with ThreadPoolExecutor(1, "hull") as thread:

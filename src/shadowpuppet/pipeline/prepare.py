@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Generic, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.progress import STAGES, Listener, generators
 from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
-from shadowpuppet.pipeline.subject import TrackedSubject
+from shadowpuppet.pipeline.subject import Before, FittedPerson, Observation, State, TrackedSubject
 from shadowpuppet.pipeline.survey.camera import survey_camera
 from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.silhouette.added import SceneHint
@@ -28,7 +28,7 @@ LOOKS_AGAIN = 3
 """Greatest number of times that a recording is surveyed again because of what the fitted body leaves unexplained."""
 
 
-class Kind(NamedTuple):
+class Kind(NamedTuple, Generic[State, Observation, Before]):
     """How a recording is surveyed, fitted and tracked: with one camera or with several."""
 
     method: str
@@ -37,10 +37,8 @@ class Kind(NamedTuple):
     """Name of the field of `Options` with the tracker's settings."""
     survey: Callable[..., Survey]
     """Examines a rig with options and, after a first fit, with a `SceneHint` for each camera."""
-    fit: Callable[[np.random.Generator, Survey, Options], TrackedSubject]
+    fit: Callable[[np.random.Generator, Survey, Options], TrackedSubject[State, Observation, Before]]
     """Measures the person and makes the tracker."""
-    look_fits: bool
-    """Whether `look_at` also measures the person; not with several cameras, which takes long."""
     stages: tuple[str, ...]
     """Stages whose times are written to metrics.json."""
 
@@ -49,19 +47,19 @@ class Kind(NamedTuple):
         return f"{'after ' if preset == 'default' else ''}{self.method.format(cameras)}"
 
 
-MONOCULAR = Kind("Liu 2011, one camera", "tracker", survey_camera, fit_monocular, True, ("decode", "segment", "track", "doubt", "write"))
-MULTIVIEW = Kind("Ni 2008, {} cameras", "multiview", survey_rig, fit_multiview, False, STAGES)
+MONOCULAR = Kind("Liu 2011, one camera", "tracker", survey_camera, fit_monocular, ("decode", "segment", "track", "doubt", "write"))
+MULTIVIEW = Kind("Ni 2008, {} cameras", "multiview", survey_rig, fit_multiview, STAGES)
 
 
-class Prepared(NamedTuple):
+class Prepared(NamedTuple, Generic[State, Observation, Before]):
     """The surveyed recording and the fitted person, before tracking."""
 
     survey: Survey
-    subject: TrackedSubject | None
+    subject: TrackedSubject[State, Observation, Before] | None
     """The fitted person; None if tracking is hopeless."""
     look: Look | RigLook
 
-    def check(self) -> TrackedSubject:
+    def check(self) -> TrackedSubject[State, Observation, Before]:
         """The fitted person. Raises `TrackingError` if tracking is hopeless."""
         if self.subject is None:
             raise TrackingError(f"{self.look.recording}: {self.look.refusal}; --anyway tries it")
@@ -70,46 +68,45 @@ class Prepared(NamedTuple):
 
 @one_blas_thread()
 def look_at(recording: str | Path, options: Options | None = None, listener: Listener | None = None) -> Look | RigLook:
-    """Examine a recording as `track_recording` does before tracking. Raises a `ShadowPuppetError` if something cannot be used."""
+    """Examine a recording as `track_recording` does before tracking; with one camera the person is measured, too, which takes long with
+    several. Raises a `ShadowPuppetError` if something cannot be used."""
     options = options or Options()
     rig = open_rig(recording, options)
-    kind = kind_of(rig)
-    if kind.look_fits:
-        return prepare(generators(options)[0], rig, options, kind, listener=listener).look
-    return kind.survey(rig, options, listener=listener).look
+    if rig.is_multiview:
+        return survey_rig(rig, options, listener=listener).look
+    return prepare(generators(options)[0], rig, options, MONOCULAR, listener=listener).look
 
 
 @one_blas_thread()
 def fit_person(recording: str | Path, file: str | Path, options: Options | None = None,
-               listener: Listener | None = None) -> tuple[TrackedSubject, Look | RigLook]:
+               listener: Listener | None = None) -> tuple[FittedPerson, Look | RigLook]:
     """Measure the person and save the sizes. Raises a `ShadowPuppetError` if no person is found or the file cannot be written."""
     options = options or Options()
-    rig = open_rig(recording, options)
-    prepared = prepare(generators(options)[0], rig, options, kind_of(rig), listener=listener)
+    rig, (rng, _) = open_rig(recording, options), generators(options)
+    if rig.is_multiview:
+        prepared = prepare(rng, rig, options, MULTIVIEW, listener=listener)
+    else:
+        prepared = prepare(rng, rig, options, MONOCULAR, listener=listener)
     subject = prepared.check()
     write_person(file, subject.person)
     return subject, prepared.look
 
 
-def kind_of(rig: Rig) -> Kind:
-    """`MONOCULAR` or `MULTIVIEW`, by the number of cameras."""
-    return MULTIVIEW if rig.is_multiview else MONOCULAR
-
-
-def look_around(rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None, listener: Listener | None = None) -> Survey:
+def look_around(rig: Rig, options: Options, kind: Kind[State, Observation, Before], cache: SilhouetteCache | None = None,
+                listener: Listener | None = None) -> Survey:
     """Survey a recording. Raises a `ShadowPuppetError` if something cannot be used."""
     survey = partial(kind.survey, listener=listener)
     return survey(rig, options) if cache is None else cache.survey(rig, options, survey)
 
 
-def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind, cache: SilhouetteCache | None = None,
-            listener: Listener | None = None) -> Prepared:
+def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind[State, Observation, Before],
+            cache: SilhouetteCache | None = None, listener: Listener | None = None) -> Prepared[State, Observation, Before]:
     """Survey a recording, and fit the person unless tracking is hopeless. Raises a `ShadowPuppetError` if something cannot be used."""
     return fit_survey(rng, look_around(rig, options, kind, cache, listener), options, kind, cache, listener or Listener())
 
 
-def fit_survey(rng: np.random.Generator, survey: Survey, options: Options, kind: Kind, cache: SilhouetteCache | None,
-            listener: Listener) -> Prepared:
+def fit_survey(rng: np.random.Generator, survey: Survey, options: Options, kind: Kind[State, Observation, Before],
+               cache: SilhouetteCache | None, listener: Listener) -> Prepared[State, Observation, Before]:
     """The surveyed recording and the person in it."""
     if survey.look.refusal is not None and not options.anyway:
         return Prepared(survey, None, survey.look)
@@ -130,7 +127,8 @@ def fit_survey(rng: np.random.Generator, survey: Survey, options: Options, kind:
     return Prepared(survey, subject, survey.look_with(subject.summary, subject.doubts))
 
 
-def _looked_again(survey: Survey, subject: TrackedSubject, options: Options, kind: Kind, listener: Listener) -> Survey | None:
+def _looked_again(survey: Survey, subject: FittedPerson, options: Options, kind: Kind[State, Observation, Before],
+                  listener: Listener) -> Survey | None:
     """The survey in which what never moves, and the fitted body leaves unexplained, belongs to the scene; None if there is nothing."""
     if all(each is None for each in subject.beside):
         return None

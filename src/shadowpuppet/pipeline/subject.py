@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -53,18 +53,26 @@ class TrackerState(Protocol):
         ...
 
 
-class Observed(NamedTuple):
+State = TypeVar("State", bound=TrackerState)
+"""All that a tracker's next frame needs of those before."""
+Observation = TypeVar("Observation")
+"""What a tracker makes of one frame set's evidence (`Seen`)."""
+Before = TypeVar("Before")
+"""What the doubt about a frame needs of the frame before."""
+
+
+class Observed(NamedTuple, Generic[Observation]):
     """A frame set and the tracker's observation of it."""
 
     frames: FrameSet
-    observation: Any
+    observation: Observation
     seconds: float = 0.0
     """Time taken to make the observation."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class TrackedSubject(ABC):
-    """A fitted person and the tracker that follows them."""
+class FittedPerson:
+    """A person whose sizes are known."""
 
     body: Body
     person: Person
@@ -75,67 +83,6 @@ class TrackedSubject(ABC):
     """Doubts about the fit, a sentence each."""
     beside: tuple[BesideBody | None, ...] = ()
     """What the body leaves unexplained in each camera's silhouettes; empty, or None, for nothing."""
-
-    state_types: ClassVar[tuple[type, ...]]
-    """The named tuples in the tracker's state and in what the doubt about the next frame needs."""
-
-    @abstractmethod
-    def observe(self, seen: Seen) -> Any:
-        """The tracker's observation of what one frame set shows."""
-
-    @abstractmethod
-    def next_state(self, rng: np.random.Generator, state: Any, observation: Any) -> Any:
-        """The tracker's state after an observation; None while there is no person."""
-
-    @abstractmethod
-    def doubt(self, state: Any, observation: Any, seconds: float, before: Any) -> tuple[Doubt, Any]:
-        """Doubt about the estimate of an observation at a time (s), and what the next frame's needs: its `before`, at first None."""
-
-    @abstractmethod
-    def draw(self, frames: FrameSet, found: MotionFrame, last: MotionFrame | None = None) -> Image:
-        """A frame of overlay.mp4, (H, W, 3), blue green red. `last`: the last frame with a pose, shown pale where this one has none."""
-
-    def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed]:
-        """Observations of frame sets, one after another."""
-        for each in frames:
-            start = time.perf_counter()
-            observation = self.observe(each.seen)
-            yield Observed(each, observation, time.perf_counter() - start)
-
-    @property
-    def both_ways(self) -> bool:
-        """Whether a film is tracked backward, too."""
-        return False
-
-    def turned_back(self, state: Any) -> TrackedSubject:
-        """The subject for tracking a film backward, with what the last state of the forward pass has learnt."""
-        return self
-
-    def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
-        """Motions of the same frames that were tracked forward and backward as one, and the weight (T,) of the backward one: 0 for subjects
-        that are not tracked `both_ways`."""
-        return forward, np.zeros(len(forward))
-
-    def left_out(self, state: Any) -> tuple[Mask | None, ...]:
-        """For each camera the pixels (H, W) that a tracker's state leaves out of the silhouettes, in masks of any size; None for none."""
-        return ()
-
-    def lean(self, found: MotionFrame, masks: Sequence[Mask | None]) -> float:
-        """How far the head lies before the neck in a frame in which the person is seen in profile (`head_lean`); NaN in others, and with
-        several cameras."""
-        return np.nan
-
-    def kept(self, state: Any) -> Any:
-        """A tracker's state without what the next frame does not need."""
-        return state
-
-    def drawn(self, state: Any) -> tuple[Bits, ...]:
-        """The body of a tracker's state in each camera's picture of half the size; empty if there is none, or with one camera."""
-        return ()
-
-    def unfound(self, observation: Any) -> str:
-        """Status of a frame without a state: `lost` or `absent`."""
-        return "absent"
 
     def landmarks(self, poses: Array) -> Array:
         """Landmarks (N, L, 3) of poses (N, D) in the world, metres."""
@@ -155,8 +102,74 @@ class TrackedSubject(ABC):
         return [self.body.landmark_names.index(name) for name in joint_names(self.body)]
 
 
-def motion_frame(subject: TrackedSubject, seconds: float, state: TrackerState | None, observation: Any,
-                 before: Any = None) -> tuple[MotionFrame, Any]:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrackedSubject(FittedPerson, ABC, Generic[State, Observation, Before]):
+    """A fitted person and the tracker that follows them: observe, next_state and doubt make a frame."""
+
+    state_types: ClassVar[tuple[type, ...]]
+    """The named tuples in the tracker's state and in what the doubt about the next frame needs."""
+
+    @abstractmethod
+    def observe(self, seen: Seen) -> Observation:
+        """The tracker's observation of what one frame set shows."""
+
+    @abstractmethod
+    def next_state(self, rng: np.random.Generator, state: State | None, observation: Observation) -> State | None:
+        """The tracker's state after an observation; None while there is no person."""
+
+    @abstractmethod
+    def doubt(self, state: State, observation: Observation, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
+        """Doubt about the estimate of an observation at a time (s), and what the next frame's needs: its `before`, at first None."""
+
+    @abstractmethod
+    def draw(self, frames: FrameSet, found: MotionFrame, last: MotionFrame | None = None) -> Image:
+        """A frame of overlay.mp4, (H, W, 3), blue green red. `last`: the last frame with a pose, shown pale where this one has none."""
+
+    def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed[Observation]]:
+        """Observations of frame sets, one after another."""
+        for each in frames:
+            start = time.perf_counter()
+            observation = self.observe(each.seen)
+            yield Observed(each, observation, time.perf_counter() - start)
+
+    @property
+    def both_ways(self) -> bool:
+        """Whether a film is tracked backward, too."""
+        return False
+
+    def turned_back(self, state: State | None) -> Self:
+        """The subject for tracking a film backward, with what the last state of the forward pass has learnt."""
+        return self
+
+    def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
+        """Motions of the same frames that were tracked forward and backward as one, and the weight (T,) of the backward one: 0 for subjects
+        that are not tracked `both_ways`."""
+        return forward, np.zeros(len(forward))
+
+    def left_out(self, state: State | None) -> tuple[Mask | None, ...]:
+        """For each camera the pixels (H, W) that a tracker's state leaves out of the silhouettes, in masks of any size; None for none."""
+        return ()
+
+    def lean(self, found: MotionFrame, masks: Sequence[Mask | None]) -> float:
+        """How far the head lies before the neck in a frame in which the person is seen in profile (`head_lean`); NaN in others, and with
+        several cameras."""
+        return np.nan
+
+    def kept(self, state: State | None) -> State | None:
+        """A tracker's state without what the next frame does not need."""
+        return state
+
+    def drawn(self, state: TrackerState | MotionFrame | None) -> tuple[Bits, ...]:
+        """The body of a tracker's state in each camera's picture of half the size; empty if there is none, or with one camera."""
+        return ()
+
+    def unfound(self, observation: Observation) -> str:
+        """Status of a frame without a state: `lost` or `absent`."""
+        return "absent"
+
+
+def motion_frame(subject: TrackedSubject[State, Observation, Before], seconds: float, state: State | None, observation: Observation,
+                 before: Before | None = None) -> tuple[MotionFrame, Before | None]:
     """The motion of one frame from a tracker's state, without a pose if the person is lost or absent; and the next frame's `before`."""
     if state is None:
         return MotionFrame(seconds, subject.unfound(observation)), None

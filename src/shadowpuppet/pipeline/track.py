@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options, check_used, plain_options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
-from shadowpuppet.pipeline.prepare import MULTIVIEW, Kind, Prepared, fit_survey, kind_of, look_around
+from shadowpuppet.pipeline.prepare import MONOCULAR, MULTIVIEW, Kind, Prepared, fit_survey, look_around
 from shadowpuppet.pipeline.progress import (
     FALLBACK_RATE,
     Checkpoints,
@@ -47,7 +47,17 @@ from shadowpuppet.pipeline.progress import (
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
 from shadowpuppet.pipeline.silhouettes import Silhouettes
-from shadowpuppet.pipeline.subject import TrackedSubject, average_body, floor_entry, joint_names, motion_frame
+from shadowpuppet.pipeline.subject import (
+    Before,
+    FittedPerson,
+    Observation,
+    State,
+    TrackedSubject,
+    average_body,
+    floor_entry,
+    joint_names,
+    motion_frame,
+)
 from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
@@ -74,15 +84,18 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
     """
     options = options or Options()
     rig = open_rig(recording, options)
-    return run(rig, kind_of(rig), folder, options, listener or Listener(), cache, resume=resume)
+    listener = listener or Listener()
+    if rig.is_multiview:
+        return run(rig, MULTIVIEW, folder, options, listener, cache, resume)
+    return run(rig, MONOCULAR, folder, options, listener, cache, resume)
 
 
-def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Listener, cache: SilhouetteCache | None = None,
-        resume: bool = False) -> Summary:
+def run(rig: Rig, kind: Kind[State, Observation, Before], folder: str | Path, options: Options, listener: Listener,
+        cache: SilhouetteCache | None = None, resume: bool = False) -> Summary:
     """Survey, fit, track and evaluate; see `track_recording`."""
     for_look, for_track = generators(options)
     check_used(options, rig.is_multiview)
-    _check_files(options, kind)
+    _check_files(options, rig)
     body, recording = average_body(getattr(options, kind.settings).body), rig.recording
     info = {"recording": recording.path.resolve(), "method": kind.name(options.preset, len(rig.cameras)),
             "cameras": list(rig.names) if rig.is_multiview else None, "settings": plain_options(options),
@@ -113,11 +126,11 @@ def run(rig: Rig, kind: Kind, folder: str | Path, options: Options, listener: Li
     return Summary(Path(folder), written.motion, metrics, prepared.look)
 
 
-def _check_files(options: Options, kind: Kind) -> None:
+def _check_files(options: Options, rig: Rig) -> None:
     """Raise `FormatError` for a person or a prior that cannot be read, before the recording is examined."""
     if options.person is not None:
-        read_person(options.person, getattr(options, kind.settings).body)
-    if options.prior is not None and kind is MULTIVIEW:
+        read_person(options.person, (options.multiview if rig.is_multiview else options.tracker).body)
+    if options.prior is not None and rig.is_multiview:
         read_prior(options.prior)
 
 
@@ -147,7 +160,7 @@ def _check_cutoff(options: Options, rate: float) -> None:
         check_cutoff(options.cutoff, rate / options.every)
 
 
-def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]], options: Options, listener: Listener,
+def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, FittedPerson]], options: Options, listener: Listener,
                motion: Motion, leans: Sequence[float] | None = None) -> None:
     """Replace the tracked motion of a run by `motion` smoothed: of each of `subjects` from its first frame to the next one's. If that is
     impossible, the motion stays as it is, with a warning. `leans`: of the head in each frame (`TrackedSubject.lean`), if they are known."""
@@ -177,7 +190,8 @@ def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, TrackedSubject]]
     writer.metrics["smooth_s"] = round(time.perf_counter() - start, 3)
 
 
-def _backward(writer: RunWriter, subject: TrackedSubject, options: Options, listener: Listener, store: MaskStore) -> Motion:
+def _backward(writer: RunWriter, subject: TrackedSubject[State, Observation, Before], options: Options, listener: Listener,
+              store: MaskStore) -> Motion:
     """The run's motion blended with that of the same silhouettes tracked backward; as it is if they were too many to be kept."""
     motion, frames = writer.motion, list[MotionFrame]()
     if len(store.sets) != len(motion):
@@ -206,21 +220,22 @@ def _steadied(now: FrameSet, silhouettes: Sequence[Silhouettes]) -> FrameSet:
     return now._replace(images=tuple(images))
 
 
-class Carried(NamedTuple):
+class Carried(NamedTuple, Generic[State, Before]):
     """What a frame needs of those before it: what a checkpoint keeps. Silhouettes, and cameras set aside, follow from the film."""
 
     look: str
     """The text of look.json."""
     generator: Mapping[str, Any]
     """State of the random generator."""
-    state: Any
+    state: State | None
     """The tracker's; None while there is no person."""
-    before: Any
+    before: Before | None
     """What the doubt about the next frame needs."""
     left_out: tuple[LeftOut | None, ...]
 
 
-def _resumed(writer: RunWriter, prepared: Prepared, rng: np.random.Generator) -> tuple[Carried, list[MotionFrame]]:
+def _resumed(writer: RunWriter, prepared: Prepared[State, Observation, Before],
+             rng: np.random.Generator) -> tuple[Carried[State, Before], list[MotionFrame]]:
     """Where a run begins: at the start, or after the frames of its checkpoint. Raises `ShadowPuppetError` if the look is another one."""
     subject, look = prepared.check(), json_text(prepared.look)
     carried, frames = writer.resumed((*subject.state_types, Carried, LeftOut)) or (Carried(look, {}, None, None, ()), [])
@@ -231,8 +246,9 @@ def _resumed(writer: RunWriter, prepared: Prepared, rng: np.random.Generator) ->
     return carried, frames
 
 
-def _track(writer: RunWriter, prepared: Prepared, kind: Kind, options: Options, listener: Listener, rng: np.random.Generator,
-           cache: SilhouetteCache | None, store: MaskStore | None) -> tuple[Sequence[float], Any]:
+def _track(writer: RunWriter, prepared: Prepared[State, Observation, Before], kind: Kind[State, Observation, Before], options: Options,
+           listener: Listener, rng: np.random.Generator, cache: SilhouetteCache | None,
+           store: MaskStore | None) -> tuple[Sequence[float], State | None]:
     """For each frame set: make silhouettes and observation, update the tracker's state, write the result. Returns the `lean` of each, and
     the last state. `store`: is filled with the silhouettes."""
     subject, survey, timer = prepared.check(), prepared.survey, StageTimer()

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.geometry import Array
 from shadowpuppet.pipeline.person_rig import HullObservation, MultiviewSubject
+from shadowpuppet.tracking.doubt.multiview import Before
 from shadowpuppet.tracking.multiview.tracker import MultiviewState
 from shadowpuppet.tracking.people.appearance import Colours
 from shadowpuppet.tracking.people.facing import Facing, Trial
@@ -61,7 +62,7 @@ class Member:
     place: Array
     """Where the figure was first seen, of shape (2,), metres."""
     lost_since: float | None = None
-    before: Any = None
+    before: Before | None = None
     """What the doubt about the next frame needs."""
     share: Share | None = None
     """The evidence of the last frame."""

@@ -31,7 +31,7 @@ from shadowpuppet.pipeline.people.census import Census
 from shadowpuppet.pipeline.people.fitting import fit_apart
 from shadowpuppet.pipeline.people.group import Group, first_people, seen_in
 from shadowpuppet.pipeline.people.kept import TYPES, KeptGroup, kept, remade, restore
-from shadowpuppet.pipeline.people.member import Look, Member
+from shadowpuppet.pipeline.people.member import Look, Member, Sighting
 from shadowpuppet.pipeline.people.retracing import Packed, Stretch, packed, retraced, stretches, with_final_bodies
 from shadowpuppet.pipeline.people.truths import matched_truths
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
@@ -169,7 +169,7 @@ class PeopleRun:
         rate, floor = self.rig.rate / self.options.every, self.census.floor
         first = self.survey.first
 
-        def fit(rng: np.random.Generator, sets: Sequence[Any]) -> MultiviewSubject:
+        def fit(rng: np.random.Generator, sets: Sequence[Sighting]) -> MultiviewSubject:
             return fit_apart(rng, self.rig.cameras, floor, self.options, rate, sets)
 
         group = Group(floor, VisualHull(self.rig.cameras, self.options.multiview.hull, company=True), fit, for_track)
