@@ -124,19 +124,33 @@ class Lists(http.server.BaseHTTPRequestHandler):
 
 
 @pipes
-@pytest.mark.parametrize("form", ["#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n{}\n#EXT-X-ENDLIST\n", "ffconcat version 1.0\nfile '{}'\n"])
+@pytest.mark.parametrize("form", ["#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n{}\n#EXT-X-ENDLIST\n",
+                                  "ffconcat version 1.0\nfile '{}'\n"])
 @pytest.mark.parametrize("scheme", ["file:", "file://", "", "crypto:file:", "concat:", "subfile,,start,0,end,0,,:"])
 def test_a_play_list_from_the_network_opens_no_file(tmp_path, watched, form, scheme):
     handler = type("Handler", (Lists,), {"content": form.format(f"{scheme}{tmp_path / 'other.avi'}").encode()})
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     try:
-        with pytest.raises(VideoError, match="no stream of pictures there that can be read|found a stream without pictures"):
+        with pytest.raises(VideoError, match=r"no stream of pictures there that can be read|found a stream without pictures"):
             open_feed(f"http://127.0.0.1:{server.server_port}/x.m3u8")
     finally:
         server.shutdown()
         server.server_close()
     assert not watched.is_set()
+
+
+def test_pictures_of_an_unknown_kind_are_said(tmp_path):
+    path = encoded(tmp_path / "a.mov", pictures(3), codec="png", pixels="rgb24")
+    path.write_bytes(path.read_bytes().replace(b"png ", b"xyz "))
+    with pytest.raises(VideoError, match=r"a\.mov: (its pictures are of a kind that cannot be decoded|no )"):
+        open_frames(path)
+
+
+def test_names_in_a_film_need_be_no_text(tmp_path):
+    path = encoded(tmp_path / "a.mkv", pictures(3), codec="mjpeg", pixels="yuvj420p")
+    path.write_bytes(path.read_bytes().replace(b"Lavf", b"L\xff\xfev"))
+    assert len(list(open_frames(path))) == 3
 
 
 # Sizes

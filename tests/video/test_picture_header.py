@@ -96,7 +96,8 @@ def test_a_picture_that_states_too_much_is_refused_before_it_is_decoded(tmp_path
 
 def test_what_cannot_be_sized_is_not_decoded(tmp_path, monkeypatch):
     monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("decoded"))
-    for content in (png(8, 8, b"IHDX"), b"P6 8 8 255 " + bytes(192), b"GIF89a" + bytes(30), b"\xff\xd8\xff\xd9", b"II*\0" + bytes(4), b"BM"):
+    for content in (png(8, 8, b"IHDX"), b"P6 8 8 255 " + bytes(192), b"GIF89a" + bytes(30), b"\xff\xd8\xff\xd9", b"II*\0" + bytes(4),
+                    b"BM"):
         (tmp_path / "a.png").write_bytes(content)
         with pytest.raises(VideoError, match=r"a\.png: not a picture that can be read"):
             read_image(tmp_path / "a.png")

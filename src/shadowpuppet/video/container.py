@@ -46,7 +46,7 @@ def opened(path: Path, threads: int | None = None) -> Iterator[tuple[InputContai
     try:
         check_regular(path)
         # "file:": a name with a colon is no protocol.
-        container = av.open(f"file:{path}", options=DOORS | GUARDS)
+        container = av.open(f"file:{path}", options=DOORS | GUARDS, metadata_errors="replace")
     except (OSError, av.error.FFmpegError) as error:
         raise VideoError(_why_not(path, error)) from None
     with container:
@@ -54,9 +54,11 @@ def opened(path: Path, threads: int | None = None) -> Iterator[tuple[InputContai
         if not streams:
             raise VideoError(f"{path}: no video stream in it; a film or a picture is expected")
         codec = streams[0].codec_context
+        if codec is None:
+            raise VideoError(f"{path}: its pictures are of a kind that cannot be decoded; convert it to .mp4 or .mkv")
         width, height = (codec.width, codec.height) if codec.width else _stated_size(path)
         if width * height > MOST_PIXELS:
-            raise VideoError(f"{path}: found frames of {width} x {height} pixels, expected at most {MOST_PIXELS} in a frame; scale the film")
+            raise VideoError(f"{path}: found frames of {width} x {height} pixels, expected at most {MOST_PIXELS} in a frame: scale it")
         codec.options = {**codec.options, **GUARDS}
         streams[0].thread_type = "AUTO"
         codec.thread_count = threads or _threads(width * height)
@@ -69,8 +71,11 @@ def _stated_size(path: Path) -> tuple[int, int]:
     import av
     import av.error
 
-    with contextlib.suppress(OSError, av.error.FFmpegError), av.open(f"file:{path}", options=DOORS | {"skip_frame": "all"}) as container:
-        return next(((each.codec_context.width, each.codec_context.height) for each in container.streams.video), (0, 0))
+    options = DOORS | {"skip_frame": "all"}
+    with (contextlib.suppress(OSError, av.error.FFmpegError),
+          av.open(f"file:{path}", options=options, metadata_errors="replace") as container):  # fmt: skip
+        return next(((each.codec_context.width, each.codec_context.height) for each in container.streams.video
+                     if each.codec_context is not None), (0, 0))
     return 0, 0
 
 
@@ -90,7 +95,7 @@ def _why_not(path: Path, error: Exception) -> str:
     found = next((kind for mark, kind in LISTS.items() if begin.startswith(mark)), None)
     if found is not None:
         return f"{path}: found {found}, expected a film that holds its own pictures, such as .mp4, .mov, .mkv or .avi; name the film itself"
-    if not isinstance(error, OSError) and getattr(error, "errno", None) == errno.EINVAL:  # a container that is not on the list
+    if not isinstance(error, OSError) and getattr(error, "errno", None) == errno.EINVAL:  # is not on the list
         return f"{path}: no film that can be read (none of {choices(FILM_SUFFIXES)}); convert it to .mp4 or .mkv"
-    return (f"{path}: no film that can be read ({reason(error)}); an .mp4 that was cut off while being written lacks its index and cannot be "
-            "played")
+    return (f"{path}: no film that can be read ({reason(error)}); an .mp4 that was cut off while being written lacks its index and cannot "
+            "be played")

@@ -27,8 +27,8 @@ def read_image(path: str | Path, grey: bool = False) -> Image:
     data = _content(Path(path))
     header, image = read_header(data), None
     if header is not None and header.most > MOST_PIXELS:
-        raise VideoError(f"{path}: found a picture of {header.width} x {header.height} pixels, which takes the memory of {header.most} while "
-                         f"it is decoded; expected at most {MOST_PIXELS}: scale it")
+        raise VideoError(f"{path}: found a picture of {header.width} x {header.height} pixels, which takes the memory of {header.most} "
+                         f"while it is decoded; expected at most {MOST_PIXELS}: scale it")
     if header is not None:
         with contextlib.suppress(cv2.error):
             image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)

@@ -67,13 +67,13 @@ def _opened(address: str, name: str) -> tuple[InputContainer, VideoStream]:
                "flags": "low_delay", "analyzeduration": "1000000",
                **({"rtsp_transport": "tcp"} if address.lower().startswith("rtsp") else {})}
     try:
-        container: Any = av.open(address, options=options, timeout=(OPEN_SECONDS, READ_SECONDS))
+        container: Any = av.open(address, options=options, metadata_errors="replace", timeout=(OPEN_SECONDS, READ_SECONDS))
     except (OSError, av.error.FFmpegError) as error:
         raise VideoError(f"{name}: no stream of pictures there that can be read ({_why(error)})") from None
-    if not container.streams.video:
+    if not any(each.codec_context is not None for each in container.streams.video):
         container.close()
         raise VideoError(f"{name}: found a stream without pictures, expected video")
-    stream = container.streams.video[0]
+    stream = next(each for each in container.streams.video if each.codec_context is not None)
     stream.codec_context.options = {**stream.codec_context.options, **GUARDS}
     stream.thread_type = "SLICE"  # threads by frames delay pictures
     return container, stream

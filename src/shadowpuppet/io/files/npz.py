@@ -65,7 +65,7 @@ def most_unpacked(path: Path) -> int:
 
 
 def check_numbers(path: Path, count: int) -> None:
-    """Raise `BrokenArchive`, with only the reason, for more numbers than a packed file may hold; each takes 8 bytes, however it is stored."""
+    """Raise `BrokenArchive`, with only the reason, for more numbers than a packed file may hold, 8 bytes each."""
     most = most_unpacked(path) // 8
     if count > most:
         raise BrokenArchive(f"found {count} numbers, expected at most {most} in a file of this size")

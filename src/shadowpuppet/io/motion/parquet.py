@@ -74,15 +74,15 @@ def _check(source: Any, path: Path, names: list[str]) -> None:
 
     for name in names:
         kind = source.schema_arrow.field(name).type
-        if not (types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind) or types.is_boolean(kind) or types.is_null(kind)):
-            raise FormatError(f"{path}: no Parquet table of joints (column {name!r}: found {shorten([str(kind)])}, expected numbers)")
+        if not any(is_kind(kind) for is_kind in (types.is_integer, types.is_floating, types.is_decimal, types.is_boolean, types.is_null)):
+            raise FormatError(f"{path}: no Parquet table of joints (column {name!r}: found {str(kind)[:99]}, expected numbers)")
     groups = [source.metadata.row_group(n) for n in range(source.metadata.num_row_groups)]
     chunks = [group.column(n) for group in groups for n in range(group.num_columns) if group.column(n).path_in_schema in names]
     rows = max(source.metadata.num_rows, sum(group.num_rows for group in groups))
     size = max(8 * max(rows * len(names), sum(each.num_values for each in chunks)), sum(each.total_uncompressed_size for each in chunks))
     if size > most_unpacked(path):
-        raise FormatError(f"{path}: found {rows} rows of {len(names)} columns, {size} bytes, expected at most {most_unpacked(path)} bytes of "
-                          "them in a file of this size")
+        raise FormatError(f"{path}: found {rows} rows of {len(names)} columns, {size} bytes, expected at most {most_unpacked(path)} "
+                          "bytes of them in a file of this size")
 
 
 def _numbers(source: Any, name: str, arrow: ModuleType) -> NDArray[np.float64]:
