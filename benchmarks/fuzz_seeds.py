@@ -41,7 +41,7 @@ from shadowpuppet.pipeline.options import make_options, options_text, read_optio
 from shadowpuppet.silhouette.external import script
 from shadowpuppet.silhouette.external.script import read_script
 from shadowpuppet.synthetic import demo_spec, read_spec, spec_text
-from shadowpuppet.video.images import read_image, write_image
+from shadowpuppet.video import open_frames, read_image, write_frames, write_image
 
 READERS: dict[str, Callable[[Path], object]] = {
     "calibration": examine_calibration,
@@ -68,6 +68,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "script": lambda path: read_script(path, "made"),
     "checkpoint": lambda path: read_checkpoint(path.parent, [MotionFrame]),
     "image": read_image,
+    "film": lambda path: next(iter(open_frames(path)), None),
 }
 """By name; each reads one of the files in the folder of that name."""
 GRID = """seeds = "0:3"
@@ -128,8 +129,20 @@ def write(folder: Path) -> None:
         (folder / "script" / path.name).write_bytes(path.read_bytes())
     frame = MotionFrame(0.1, "tracked", rng.random(4), np.asfortranarray(rng.random((3, 3))))
     write_checkpoint(folder / "checkpoint", Checkpoint(1, (frame, {"a": None, "b": True}, np.float64(2))))
-    for ending in ("png", "jpg", "bmp"):
+    for ending in ("png", "jpg", "bmp", "tif", "webp"):
         write_image(folder / "image" / f"a.{ending}", rng.integers(0, 255, (12, 16, 3), np.uint8))
+    _films(folder / "film", rng)
+
+
+def _films(folder: Path, rng: np.random.Generator) -> None:
+    """Films, and lists that name one."""
+    for name in ("a.mp4", "a.mkv"):
+        with write_frames(folder / name, 25.0) as film:
+            for _ in range(3):
+                film.write(rng.integers(0, 255, (12, 16, 3), np.uint8))
+    (folder / "list.m3u8").write_text("#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\na.mp4\n#EXT-X-ENDLIST\n")
+    (folder / "list.mp4").write_text("ffconcat version 1.0\nfile a.mp4\n")
+    (folder / "a.y4m").write_bytes(b"YUV4MPEG2 W16 H12 F25:1 C420jpeg\nFRAME\n" + bytes(16 * 12 * 3 // 2))
 
 
 def _calibrations(folder: Path, made: list[Camera]) -> None:

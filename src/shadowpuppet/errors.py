@@ -18,7 +18,8 @@ BROKEN, MISTAKE, SOME_FAILED, PERSON_LOST, INTERRUPTED = 1, 2, 3, 4, 130
 """Exit codes other than 0: the core does not work on this machine (`doctor`) or a bug of the program; unusable input; some of several runs
 failed (`batch`); a run that lost the person in most frames (`track`); Ctrl-C."""
 
-
+FILE_MEMORY = 500_000_000
+"""Memory that reading a file may take beyond the file's own size, bytes. Limits of what files state are derived from it."""
 LONGEST = 2000
 """Number of characters of a message beyond which its middle is left out."""
 

@@ -278,8 +278,8 @@ def test_an_avi_cut_between_two_pictures_is_broken_off_too(tmp_path):
     ("nowhere.mp4", None, "no such film"),
     ("empty.mp4", b"", "no film that can be read"),
     ("text.mp4", b"not a film\n" * 100, "no film that can be read"),
-    ("text.txt", b"not a film\n" * 100, "no video stream"),
-    ("list.m3u8", b"#EXTM3U\n#EXTINF:1,\nhttp://127.0.0.1:9/a.ts\n#EXT-X-ENDLIST\n", "no "),
+    ("text.txt", b"not a film\n" * 100, "no film that can be read (none of .264, "),
+    ("list.m3u8", b"#EXTM3U\n#EXTINF:1,\nhttp://127.0.0.1:9/a.ts\n#EXT-X-ENDLIST\n", "found a play list (HLS), expected a film"),
     ("picture.png", b"\x89PNG\r\n\x1a\n", "not a picture that can be read"),
     ("picture.jpg", b"", "not a picture that can be read"),
 ])

@@ -11,7 +11,8 @@ import numpy as np
 
 from shadowpuppet.errors import VideoError
 from shadowpuppet.video.camera_device import camera_number, open_camera
-from shadowpuppet.video.film import FILM_SUFFIXES, open_film
+from shadowpuppet.video.container import FILM_SUFFIXES
+from shadowpuppet.video.film import open_film
 from shadowpuppet.video.frames import Frame, FrameSource, Image, Size, Wanted
 from shadowpuppet.video.images import IMAGE_SUFFIXES, open_folder, open_picture, read_image, write_image
 from shadowpuppet.video.writer import FrameWriter, write_frames

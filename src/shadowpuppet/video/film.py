@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shadowpuppet.errors import VideoError, check_regular, reason, warn
-from shadowpuppet.threads import thread_limit
-from shadowpuppet.video.frames import ASSUMED_RATE, EVERY, Frame, FrameSource, Image, Wanted, check_size, size_of
+from shadowpuppet.errors import VideoError, reason, warn
+from shadowpuppet.video.container import opened
+from shadowpuppet.video.frames import ASSUMED_RATE, EVERY, MOST_PIXELS, Frame, FrameSource, Image, Wanted, check_size, size_of
 from shadowpuppet.video.selection import Irregular, Select, Stamped, chosen
 
 if TYPE_CHECKING:
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from av.container import InputContainer
     from av.video.stream import VideoStream
 
-FILM_SUFFIXES = (".264", ".3gp", ".avi", ".flv", ".gif", ".h264", ".hevc", ".m2ts", ".m4v", ".mjpeg", ".mkv", ".mov", ".mp4",
-                 ".mpeg", ".mpg", ".mts", ".mxf", ".ogv", ".ts", ".webm", ".wmv", ".y4m")
-"""Endings of films that are found in a folder; others must be named."""
 PLAIN_LUMA = re.compile(r"yuvj?4\d\dp|nv12|nv16|nv21|gray")
 """Pixel formats whose first plane is the 8-bit luma."""
 DEEP_LUMA = re.compile(r"yuv|p[024]1|gray1")
@@ -45,7 +42,8 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
         except Break:
             first = None
         if first is None:
-            raise VideoError(f"{path}: no frame of it can be decoded ({stream.codec_context.name})")
+            raise VideoError(f"{path}: no frame of it can be decoded ({stream.codec_context.name}; at most {MOST_PIXELS} "
+                             "pixels are)")
         size = size_of(converter(grey)(first))
         timed = first.pts is not None or first.dts is not None
         stated_rate = (stream.average_rate if timed else stream.guessed_rate) or stream.guessed_rate
@@ -141,29 +139,6 @@ def _declared_duration(container: InputContainer, stream: VideoStream) -> float:
 
 class Break(Exception):
     """A film cannot be decoded beyond this point."""
-
-
-@contextlib.contextmanager
-def opened(path: Path, threads: int | None = None) -> Iterator[tuple[InputContainer, VideoStream]]:
-    """Open a film; gives its container and video stream. `threads` that decode: each of several has a frame of its own before the first
-    comes, so that one is quicker for a few frames. Raises `VideoError`."""
-    import av
-    import av.error
-
-    try:
-        check_regular(path)
-        # "file:" and the white list: a name with a colon is no protocol, and a play list cannot open other files or addresses.
-        container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
-    except (OSError, av.error.FFmpegError) as error:
-        raise VideoError(f"{path}: no film that can be read ({reason(error)}); an .mp4 that was cut off while being written "
-                         "lacks its index and cannot be played") from None
-    with container:
-        streams = [s for s in container.streams.video if not s.disposition & s.disposition.attached_pic]
-        if not streams or container.format.name == "tty":  # FFmpeg renders text files as video
-            raise VideoError(f"{path}: no video stream in it; a film or a picture is expected")
-        streams[0].thread_type = "AUTO"
-        streams[0].codec_context.thread_count = threads or thread_limit() or 0  # 0: FFmpeg's default
-        yield container, streams[0]
 
 
 def decoded(container: InputContainer, stream: VideoStream, needless: Callable[[Packet], bool] | None = None) -> Iterator[VideoFrame]:

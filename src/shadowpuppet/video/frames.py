@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import VideoError
+from shadowpuppet.errors import FILE_MEMORY, VideoError
 
 Image = NDArray[np.uint8]
 """A picture, of shape (H, W, 3), blue green red, or (H, W) grey, 0..255."""
@@ -22,6 +22,8 @@ Wanted = Callable[[float], bool]
 EVERY: Wanted = lambda _: True  # noqa: E731
 """All frames are: they are decoded one after another."""
 
+MOST_PIXELS = int(FILE_MEMORY / 12.5)
+"""Greatest number of pixels of a picture: decoders take up to 12 bytes for each (animated PNG; JPEG of four colours 11)."""
 ROUNDING = 1e-6
 """Rounding error of a time, seconds."""
 ASSUMED_RATE = 30.0

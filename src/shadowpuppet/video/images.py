@@ -12,27 +12,40 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import VideoError, check_regular, choices, reason, warn
-from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, Wanted, check_size, size_of
+from shadowpuppet.errors import FILE_MEMORY, VideoError, check_regular, choices, reason, warn
+from shadowpuppet.video.frames import ASSUMED_RATE, MOST_PIXELS, Frame, FrameSource, Image, Wanted, check_size, size_of
+from shadowpuppet.video.picture_header import read_header
 
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
 
 
 def read_image(path: str | Path, grey: bool = False) -> Image:
-    """Read a picture, (H, W, 3) blue green red or (H, W) grey, 8 bit, rotated as its EXIF data say. Raises `VideoError`."""
+    """Read a picture, (H, W, 3) blue green red or (H, W) grey, 8 bit, rotated as its EXIF data say; its size is checked before it is
+    decoded. Raises `VideoError`. The only place where pictures are decoded."""
     import cv2
 
-    try:
-        check_regular(Path(path))
-        data = np.frombuffer(Path(path).read_bytes(), np.uint8)  # cv2.imread cannot open every name on every system
-        image = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR) if data.size else None
-    except OSError as error:
-        raise VideoError(f"{path}: the picture cannot be read ({reason(error)})") from None
-    except cv2.error:
-        image = None
+    data = _content(Path(path))
+    header, image = read_header(data), None
+    if header is not None and header.most > MOST_PIXELS:
+        raise VideoError(f"{path}: found a picture of {header.width} x {header.height} pixels, which takes the memory of {header.most} "
+                         f"while it is decoded; expected at most {MOST_PIXELS}: scale it")
+    if header is not None:
+        with contextlib.suppress(cv2.error):
+            image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
     if image is None:
         raise VideoError(f"{path}: not a picture that can be read (damaged, or none of {choices(IMAGE_SUFFIXES)})")
     return np.asarray(image, np.uint8)
+
+
+def _content(path: Path) -> bytes:
+    """A picture file's bytes: `cv2.imread` cannot open every name on every system."""
+    try:
+        check_regular(path)
+        if path.stat().st_size > FILE_MEMORY:
+            raise VideoError(f"{path}: found {path.stat().st_size} bytes, expected a picture of at most {FILE_MEMORY}")
+        return path.read_bytes()
+    except OSError as error:
+        raise VideoError(f"{path}: the picture cannot be read ({reason(error)})") from None
 
 
 def write_image(path: str | Path, image: Image) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from shadowpuppet.errors import VideoError, reason
+from shadowpuppet.video.container import CONTAINERS, GUARDS
 from shadowpuppet.video.film import converter
 from shadowpuppet.video.frames import Image, Size, size_of
 
@@ -21,6 +22,8 @@ SCHEMES = ("http", "https", "rtmp", "rtp", "rtsp", "rtsps", "tcp", "udp")
 """Schemes of addresses that can be opened."""
 PROTOCOLS = "crypto,http,https,httpproxy,rtmp,rtp,rtsp,srtp,tcp,tls,udp"
 """Protocols that FFmpeg may use; `file` is not among them, so that a stream's play list cannot read this machine's files."""
+KINDS = (*CONTAINERS, "aac", "hls", "live_flv", "mp3", "mpegtsraw", "mpjpeg", "rtp", "rtsp", "sdp", "webvtt")
+"""FFmpeg's names of the kinds of stream that are read, and of the parts of such streams."""
 OPEN_SECONDS, READ_SECONDS = 8.0, 3.0
 """Time-outs, seconds, for an address to answer and for a stream's next data."""
 
@@ -60,16 +63,18 @@ def _opened(address: str, name: str) -> tuple[InputContainer, VideoStream]:
     import av.error
 
     # Buffer little, for a low latency.
-    options = {"protocol_whitelist": PROTOCOLS, "fflags": "nobuffer", "flags": "low_delay", "analyzeduration": "1000000",
+    options = {"protocol_whitelist": PROTOCOLS, "format_whitelist": ",".join(KINDS), **GUARDS, "fflags": "nobuffer",
+               "flags": "low_delay", "analyzeduration": "1000000",
                **({"rtsp_transport": "tcp"} if address.lower().startswith("rtsp") else {})}
     try:
-        container: Any = av.open(address, options=options, timeout=(OPEN_SECONDS, READ_SECONDS))
+        container: Any = av.open(address, options=options, metadata_errors="replace", timeout=(OPEN_SECONDS, READ_SECONDS))
     except (OSError, av.error.FFmpegError) as error:
         raise VideoError(f"{name}: no stream of pictures there that can be read ({_why(error)})") from None
-    if not container.streams.video:
+    if not any(each.codec_context is not None for each in container.streams.video):
         container.close()
         raise VideoError(f"{name}: found a stream without pictures, expected video")
-    stream = container.streams.video[0]
+    stream = next(each for each in container.streams.video if each.codec_context is not None)
+    stream.codec_context.options = {**stream.codec_context.options, **GUARDS}
     stream.thread_type = "SLICE"  # threads by frames delay pictures
     return container, stream
 

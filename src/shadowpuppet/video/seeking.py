@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 
 from shadowpuppet.errors import VideoError
-from shadowpuppet.video.film import Break, converter, decoded, opened
+from shadowpuppet.video.container import opened
+from shadowpuppet.video.film import Break, converter, decoded
 from shadowpuppet.video.frames import ASSUMED_RATE, Image, Size
 from shadowpuppet.video.images import IMAGE_SUFFIXES, in_folder, read_image
 

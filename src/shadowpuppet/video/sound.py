@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.video.film import opened
+from shadowpuppet.video.container import opened
 
 if TYPE_CHECKING:
     from av.container import InputContainer

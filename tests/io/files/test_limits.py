@@ -11,6 +11,7 @@ import zipfile
 import acclaim
 import numpy as np
 import pytest
+from memory import memory_of
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.calibration.calibration_files import read_calibration
@@ -108,6 +109,43 @@ def test_a_parquet_file_of_too_many_rows_is_not_read(tmp_path, monkeypatch):
     monkeypatch.setattr(parquet.ParquetFile, "read", lambda *_: pytest.fail("read"))
     with pytest.raises(FormatError, match=r"found 1000000 rows of 4 columns"):
         read_motion(tmp_path / "a.parquet")
+
+
+def packed(path, rows, column):
+    """A Parquet table of a joint whose columns are alike; its times are counted."""
+    arrow = pytest.importorskip("pyarrow")
+    import pyarrow.parquet as parquet
+
+    columns = {"time": np.arange(rows, dtype="i4"), **dict.fromkeys(("a_x", "a_y", "a_z"), arrow.array(column))}
+    parquet.write_table(arrow.table(columns), path, compression="zstd", use_dictionary=["a_x", "a_y", "a_z"],
+                        column_encoding={"time": "DELTA_BINARY_PACKED"})
+    return path
+
+
+@pytest.mark.parametrize("column", [["1" * 9] * 1000, [[1.0] * 9] * 1000])
+def test_texts_and_lists_are_no_columns_of_joints_however_often_they_repeat(tmp_path, column):
+    with pytest.raises(FormatError, match=r"column 'a_x': found (string|list<.*>), expected numbers"):
+        read_motion(packed(tmp_path / "a.parquet", 1000, column))
+
+
+@pytest.mark.parametrize("rows", [3_900_000, 16_000_000])
+def test_a_packed_table_takes_the_memory_that_is_promised(tmp_path, rows):
+    """About the most rows that are read, and too many."""
+    small, large = (packed(tmp_path / f"{n}.parquet", n, np.zeros(n, "i1")) for n in (10, rows))
+    assert large.stat().st_size < 4e6
+    found = memory_of("from shadowpuppet.io.motion.motion_files import read_motion", "read_motion", large, small)
+    assert found < 500e6 if rows < 4e6 else found < 30e6
+
+
+def test_few_bytes_a_number_are_no_way_to_fill_the_memory(tmp_path):
+    """Joints of one byte a number become eight times as large."""
+    for count in (1, 12_000_000):
+        arrays = {"times": np.arange(count, dtype="u4"), "joint_names": ["a"], "joints": np.zeros((count, 1, 3), "i1")}
+        np.savez_compressed(tmp_path / f"{count}.npz", **arrays)
+    with pytest.raises(FormatError, match="found 48000001 numbers, expected at most "):
+        read_motion(tmp_path / "12000000.npz")
+    imports = "from shadowpuppet.io.motion.motion_files import read_motion"
+    assert memory_of(imports, "read_motion", tmp_path / "12000000.npz", tmp_path / "1.npz") < 300e6
 
 
 def test_a_lock_is_held_by_one_and_names_it(tmp_path):

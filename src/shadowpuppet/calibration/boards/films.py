@@ -15,7 +15,7 @@ from shadowpuppet.calibration.boards.detection import BoardDetector, View
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.threads import usable_cores
-from shadowpuppet.video.film import FILM_SUFFIXES, opened
+from shadowpuppet.video.container import FILM_SUFFIXES, opened
 from shadowpuppet.video.images import IMAGE_SUFFIXES, read_image
 from shadowpuppet.video.seeking import Seeker
 

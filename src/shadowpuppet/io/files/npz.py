@@ -17,13 +17,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.errors import ShadowPuppetError, check_regular, one_line, reason
+from shadowpuppet.errors import FILE_MEMORY, ShadowPuppetError, check_regular, one_line, reason
 
 BROKEN = (EOFError, ValueError, TypeError, KeyError, AttributeError, OverflowError, MemoryError, RuntimeError, SyntaxError,
           tokenize.TokenError, struct.error, zlib.error, lzma.LZMAError, zipfile.BadZipFile)  # fmt: skip
 """Exceptions, other than `OSError`, that NumPy raises for a file that is damaged, encrypted or no archive."""
-UNPACKED, RATIO = 128_000_000, 100
-"""Greatest size of the arrays of an archive: bytes, or over its own size if that is more. No motion can be packed more tightly."""
+UNPACKED, RATIO = FILE_MEMORY // 4, 10
+"""Greatest size of the arrays of a packed file: bytes, of which reading holds up to four copies, or over its own size if that is more. No
+long motion can be packed more tightly."""
 HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
 
@@ -61,6 +62,13 @@ def read_members(path: Path, names: Sequence[str] | None = None) -> dict[str, ND
 def most_unpacked(path: Path) -> int:
     """Greatest size of what is packed in a file, bytes."""
     return max(UNPACKED, RATIO * path.stat().st_size)
+
+
+def check_numbers(path: Path, count: int) -> None:
+    """Raise `BrokenArchive`, with only the reason, for more numbers than a packed file may hold, 8 bytes each."""
+    most = most_unpacked(path) // 8
+    if count > most:
+        raise BrokenArchive(f"found {count} numbers, expected at most {most} in a file of this size")
 
 
 def _array(member: bytes) -> NDArray:

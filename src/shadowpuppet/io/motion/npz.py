@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io.files.npz import archive_bytes, read_all_arrays, read_arrays
+from shadowpuppet.io.files.npz import archive_bytes, check_numbers, read_all_arrays, read_arrays
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.motion.motion import JointTable, Motion
 
@@ -23,7 +23,9 @@ LATER_ARRAYS = ("limb_status",)
 def read_npz(path: str | Path) -> JointTable:
     """Joints of an archive with `JOINT_ARRAYS`; ignores others. Raises `FormatError`."""
     try:
-        times, names, joints = (read_all_arrays(Path(path), JOINT_ARRAYS)[name] for name in JOINT_ARRAYS)
+        arrays = read_all_arrays(Path(path), JOINT_ARRAYS)
+        check_numbers(Path(path), sum(array.size for array in arrays.values()))
+        times, names, joints = (arrays[name] for name in JOINT_ARRAYS)
         return JointTable(times, tuple(names.astype(str).ravel().tolist()), joints)
     except (ShadowPuppetError, ValueError, TypeError) as error:
         expected = f"expected an archive with the arrays {', '.join(JOINT_ARRAYS)}"
@@ -40,6 +42,7 @@ def read_motion_npz(path: Path) -> Motion:
     try:
         arrays: dict[str, Any] = read_all_arrays(path, [name for name in MOTION_ARRAYS if name not in LATER_ARRAYS])
         arrays |= read_arrays(path, LATER_ARRAYS)
+        check_numbers(path, sum(array.size for array in arrays.values()))
         arrays["body_name"] = str(arrays["body_name"])
         return Motion(**arrays)
     except (ShadowPuppetError, ValueError, TypeError) as error:

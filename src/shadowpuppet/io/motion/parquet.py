@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, check_regular, extra_command
 from shadowpuppet.io.files.npz import most_unpacked
@@ -53,19 +54,40 @@ def read_parquet(path: str | Path) -> JointTable:
             if "time" not in columns:
                 raise FormatError(f"{path}: no column 'time'; columns there: {shorten(columns)}")
             names = column_joints(path, columns)
-            wanted = ["time", *joint_columns(names)]
-            if source.metadata.num_rows * len(wanted) * 8 > most_unpacked(path):
-                raise FormatError(f"{path}: found {source.metadata.num_rows} rows of {len(wanted)} columns, expected at most "
-                                  f"{most_unpacked(path)} bytes of them in a file of this size")
-            table = source.read(wanted)
-            values = np.stack([table.column(name).cast(arrow.float64()).to_numpy() for name in wanted], 1)
+            _check(source, path, ["time", *joint_columns(names)])
+            times = _numbers(source, "time", arrow)
+            positions = np.empty((len(times), 3 * len(names)))
+            for n, name in enumerate(joint_columns(names)):  # one after another, so that memory holds few copies
+                positions[:, n] = _numbers(source, name, arrow)
     except FormatError:
         raise
     except (OSError, arrow.ArrowException, ValueError, KeyError) as error:
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise FormatError(f"{path}: no Parquet table of joints ({shorten([first])})") from None
     with errors_named(path):
-        return JointTable(values[:, 0], names, values[:, 1:].reshape(len(values), len(names), 3))
+        return JointTable(times, names, positions.reshape(len(times), len(names), 3))
+
+
+def _check(source: Any, path: Path, names: list[str]) -> None:
+    """Raise `FormatError` if columns are no numbers, or, by what the file states of them, take too much memory."""
+    import pyarrow.types as types
+
+    for name in names:
+        kind = source.schema_arrow.field(name).type
+        if not any(is_kind(kind) for is_kind in (types.is_integer, types.is_floating, types.is_decimal, types.is_boolean, types.is_null)):
+            raise FormatError(f"{path}: no Parquet table of joints (column {name!r}: found {str(kind)[:99]}, expected numbers)")
+    groups = [source.metadata.row_group(n) for n in range(source.metadata.num_row_groups)]
+    chunks = [group.column(n) for group in groups for n in range(group.num_columns) if group.column(n).path_in_schema in names]
+    rows = max(source.metadata.num_rows, sum(group.num_rows for group in groups))
+    size = max(8 * max(rows * len(names), sum(each.num_values for each in chunks)), sum(each.total_uncompressed_size for each in chunks))
+    if size > most_unpacked(path):
+        raise FormatError(f"{path}: found {rows} rows of {len(names)} columns, {size} bytes, expected at most {most_unpacked(path)} "
+                          "bytes of them in a file of this size")
+
+
+def _numbers(source: Any, name: str, arrow: ModuleType) -> NDArray[np.float64]:
+    """A column (T,), NaN for null."""
+    return source.read([name]).column(name).cast(arrow.float64()).to_numpy()
 
 
 def _arrow(path: str | Path) -> tuple[ModuleType, ModuleType]:
