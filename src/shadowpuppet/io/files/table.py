@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
@@ -21,30 +24,39 @@ SEPARATORS = {";": "semicolons", "\t": "tabs"}
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A table as text. Columns are parsed on access; unused ones may contain anything."""
+    """A table as text. Columns are parsed on access; unused ones may contain anything. Cells are not kept apart: as texts of their own they
+    would take forty times the file's size."""
 
     path: Path
     columns: tuple[str, ...]
-    rows: list[list[str]]
-    lines: list[int]
-    """Line number in the file of each row."""
+    text: str
+    begins: NDArray[np.int64]
+    """Where each row begins in the text, of shape (T,)."""
+    lines: NDArray[np.int64]
+    """Line number in the file of each row, of shape (T,)."""
 
     def numbers(self, names: Sequence[str]) -> Array:
         """Columns as an array (T, len(names)), NaN in empty cells. Raises `FormatError` naming line and column."""
-        places = [self._place(name) for name in names]
-        rows = [self._row(i, places) for i in range(len(self.rows))]
-        return np.array(rows, float).reshape(len(rows), len(places))
+        places, out = [self._place(name) for name in names], np.empty((len(self.lines), len(names)))
+        for i, row in enumerate(self._rows()):
+            out[i] = [number(self.path, int(self.lines[i]), self.columns[place], row[place]) for place in places]
+        return out
 
     def texts(self, name: str) -> list[str]:
         """A column's text. Raises `FormatError` if it is missing."""
-        place = self._place(name)
-        return [row[place].strip() for row in self.rows]
+        place, known = self._place(name), dict[str, str]()
+        return [known.setdefault(cell, cell) for cell in (row[place].strip() for row in self._rows())]
 
     def times(self) -> Array:
         """The column `time` (T,), seconds. Raises `FormatError` if a time is missing or does not increase."""
         times = self.numbers(["time"])[:, 0]
         check_times(self.path, times, self.lines)
         return times
+
+    def _rows(self) -> Iterator[list[str]]:
+        """The cells of each row."""
+        for begin in self.begins:
+            yield next(csv.reader(_Lines(self.text, int(begin))))
 
     def _place(self, name: str) -> int:
         if name not in self._places:
@@ -55,8 +67,21 @@ class Table:
     def _places(self) -> dict[str, int]:
         return {name: n for n, name in reversed([*enumerate(self.columns)])}
 
-    def _row(self, i: int, places: list[int]) -> list[float]:
-        return [number(self.path, self.lines[i], self.columns[place], self.rows[i][place]) for place in places]
+
+class _Lines:
+    """The lines of a text from some place on, with their ends; of a `StringIO` they would take four times the memory."""
+
+    def __init__(self, text: str, at: int = 0) -> None:
+        self.text, self.at = text, at
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __next__(self) -> str:
+        begin, self.at = self.at, self.text.find("\n", self.at) + 1 or len(self.text)
+        if begin == self.at:
+            raise StopIteration
+        return self.text[begin : self.at]
 
 
 def number(path: Path, line: int, column: str, cell: str) -> float:
@@ -70,7 +95,7 @@ def number(path: Path, line: int, column: str, cell: str) -> float:
     return value
 
 
-def check_times(path: Path, times: Array, lines: Sequence[int]) -> None:
+def check_times(path: Path, times: Array, lines: Sequence[int] | NDArray[np.int64]) -> None:
     """Raise `FormatError`, naming the line, if times (T,) are missing or do not increase."""
     bad = np.flatnonzero(~np.isfinite(times) | (np.diff(times, prepend=-np.inf) <= 0))
     if len(bad):
@@ -88,21 +113,26 @@ def read_table(path: Path, cut: bool = False) -> Table:
     text = read_text(path)
     if cut:
         text = text[: text.rfind("\n") + 1]
-    reader = csv.reader(io.StringIO(text, newline=""))
-    rows, lines = [], []
+    columns, begins, numbers, begin = None, array("q"), array("q"), 0
+    reader = csv.reader(lines := _Lines(text))
     try:
         for row in reader:
-            if len(row) > 1 or any(map(str.strip, row)):
-                rows.append(row)
-                lines.append(reader.line_num)
+            begin, here = lines.at, begin
+            if len(row) <= 1 and not any(map(str.strip, row)):
+                continue
+            if columns is None:
+                columns = tuple(cell.strip() for cell in row)
+                _check_columns(path, columns)
+            elif len(row) != len(columns):
+                raise FormatError(f"{path}: line {reader.line_num}: found {len(row)} cells, expected {len(columns)} as in the header")
+            else:
+                begins.append(here)
+                numbers.append(reader.line_num)
     except csv.Error as error:
         raise FormatError(f"{path}: line {reader.line_num}: {error}, expected a table with commas (CSV)") from None
-    columns = tuple(cell.strip() for cell in rows[0]) if rows else ()
-    _check_columns(path, columns)
-    for row, line in zip(rows[1:], lines[1:]):
-        if len(row) != len(columns):
-            raise FormatError(f"{path}: line {line}: found {len(row)} cells, expected {len(columns)} as in the header")
-    return Table(path, columns, rows[1:], lines[1:])
+    if columns is None:
+        _check_columns(path, columns := ())
+    return Table(path, columns, text, np.array(begins, np.int64), np.array(numbers, np.int64))
 
 
 def csv_line(cells: Iterable[str]) -> str:
