@@ -23,11 +23,17 @@ LONGEST = 2000
 """Number of characters of a message beyond which its middle is left out."""
 
 
-def one_line(text: object) -> str:
-    """A message on one line, without control characters and of limited length: names and values in it may come from anywhere."""
+def printable(text: object) -> str:
+    """A text on one line, without control characters: names and values in it may come from anywhere."""
     line = str(text)
-    if not line.isprintable():
-        line = "".join(each if each.isprintable() else " " if each.isspace() else "\ufffd" for each in line)
+    if line.isprintable():
+        return line
+    return "".join(each if each.isprintable() else " " if each.isspace() else "\ufffd" for each in line)
+
+
+def one_line(text: object) -> str:
+    """A `printable` message of limited length."""
+    line = printable(text)
     return line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
 
 
