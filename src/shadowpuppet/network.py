@@ -157,10 +157,18 @@ class Connections:
         self._of = Counter[str]()
         self._lock = threading.Lock()
 
+    def __len__(self) -> int:
+        """Number of connections that are counted."""
+        return self._of.total()
+
+    def has_room(self, address: str) -> bool:
+        """Whether one more connection with an address may be kept."""
+        return len(self) < self.most and self._of[address] < self.most_of_address
+
     def enter(self, address: str) -> bool:
         """Count a connection with an address; False, and nothing is counted, if there are too many already."""
         with self._lock:
-            if self._of.total() >= self.most or self._of[address] >= self.most_of_address:
+            if not self.has_room(address):
                 return False
             self._of[address] += 1
             return True

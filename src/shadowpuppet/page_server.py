@@ -40,9 +40,13 @@ class PageServer(ThreadingHTTPServer):
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """Answer in a thread of its own, or close the connection if there are too many already."""
-        if self._connections.enter(client_address[0]):
+        if not self._connections.enter(client_address[0]):
+            self.shutdown_request(request)
+            return
+        try:
             super().process_request(request, client_address)
-        else:
+        except RuntimeError:  # there is no thread for it
+            self._connections.leave(client_address[0])
             self.shutdown_request(request)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:

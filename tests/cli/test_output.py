@@ -47,7 +47,8 @@ def test_whatever_door_a_name_is_printed_through_it_is_clean(name):
     assert said.count("\n") == 1
     assert is_clean(printed(say_text, name.replace("\t", " ")))
     assert is_clean(printed(show_next, name))
-    assert is_clean(printed(show, pairs([(name, name), ("lines", [name, name])]), table(name, (name, "b"), [(name, name)]), name, Text(name)))
+    shown = pairs([(name, name), ("lines", [name, name])]), table(name, (name, "b"), [(name, name)]), name, Text(name)
+    assert is_clean(printed(show, *shown))
     assert is_clean(text := printed(show_json, {name: [name]}))
     try:
         name.encode()
