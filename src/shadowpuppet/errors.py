@@ -135,7 +135,12 @@ def shown(value: object) -> str:
 
 def reason(error: BaseException) -> str:
     """What the system or a codec says of an error, without its number and path."""
-    return (getattr(error, "strerror", None) or str(error) or "unknown reason").lower()
+    return (getattr(error, "strerror", None) or str(error) or ("out of memory" if is_out_of_memory(error) else "unknown reason")).lower()
+
+
+def is_out_of_memory(error: BaseException) -> bool:
+    """Whether an error says that memory does not suffice: Python's, NumPy's and FFmpeg's are `MemoryError`, OpenCV's has a code."""
+    return isinstance(error, MemoryError) or (type(error).__module__ == "cv2" and getattr(error, "code", None) == -4)
 
 
 def check_regular(path: Path) -> None:

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
+import av
+import av.error
+import cv2
 import numpy as np
 import pytest
 from hypothesis import example, given
@@ -17,9 +22,12 @@ from rich.text import Text
 
 from shadowpuppet.cli.tables import pairs, show, show_json, show_next, table
 from shadowpuppet.cli.terminal import Terminal
+from shadowpuppet.errors import VideoError
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.output import say, say_text
+from shadowpuppet.video import read_image, write_image
+from shadowpuppet.video.film import decoded, opened
 
 BAD = "[red]a\x1b[2J\x1b]0;title\x07\u202eb\u2066\x9b31m\x85\u2028\r\x7f[/red]:smile:\nc\tend"
 """A name with markup of rich, escapes of a terminal, controls of direction, C1 controls and line ends."""
@@ -168,3 +176,52 @@ def test_a_letter_that_the_terminal_lacks_is_written_as_an_escape(tmp_path):
     done = run("info", file, env=os.environ | {"PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, "")
     assert "gr\\xf6\\xdfer" in done.stdout
+
+
+# Memory
+
+
+@pytest.mark.parametrize("error", ["cv2", MemoryError(), MemoryError("Unable to allocate 3.00 GiB for an array"), "av"])
+def test_too_little_memory_is_said_in_a_sentence_that_names_the_file(error, shell, recording, tmp_path, monkeypatch):
+    raised, said = out_of_memory(error)
+    monkeypatch.setattr("shadowpuppet.video.film.converter", lambda grey: raised)
+    code, out, err = shell("info", recording)
+    assert (code, out) == (2, "")
+    assert re.fullmatch(rf"error: \S+\.\w+: too large for the memory of this machine \({said}\)\n", err)
+    monkeypatch.setattr("shadowpuppet.cli.recordings.validate", raised)
+    code, out, err = shell("synthesize", "-o", tmp_path / "made")
+    assert (code, out) == (2, "")
+    assert re.fullmatch(rf"error: the memory of this machine does not suffice \({said}\); a lower --max-size, .*\n", err)
+
+
+def out_of_memory(error: object):
+    """A function that raises an error, and what is said of it."""
+    if error == "cv2":
+        return lambda *_, **__: cv2.resize(np.zeros((1, 1), np.uint8), (2**25, 2**25)), r".*insufficient memory.*"
+    if error == "av":
+        error = av.error.MemoryError(12, "Cannot allocate memory", "film.mp4")
+    assert isinstance(error, MemoryError)
+
+    def raised(*_, **__):
+        raise error
+
+    return raised, {"": "out of memory"}.get(str(error), "(cannot allocate memory|unable to allocate .*)")
+
+
+def test_a_decoder_without_memory_is_no_damaged_film(monkeypatch):
+    raised, _ = out_of_memory("av")
+    packet = SimpleNamespace(is_corrupt=False, decode=raised)
+    with pytest.raises(MemoryError):
+        next(decoded(SimpleNamespace(demux=lambda _: iter([packet])), SimpleNamespace()))  # pyright: ignore[reportArgumentType]
+
+
+def test_pictures_and_films_that_are_too_large_are_named(tmp_path, monkeypatch):
+    path = tmp_path / "room.png"
+    write_image(path, np.zeros((4, 4), np.uint8))
+    large, _ = out_of_memory("cv2")
+    monkeypatch.setattr(cv2, "imdecode", large)
+    with pytest.raises(VideoError, match=r"room\.png: too large for the memory of this machine \(.*insufficient memory"):
+        read_image(path)
+    monkeypatch.setattr(av, "open", out_of_memory("av")[0])
+    with pytest.raises(VideoError, match=r"room\.png: too large for the memory of this machine \(cannot allocate memory"), opened(path):
+        pass

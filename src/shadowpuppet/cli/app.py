@@ -9,7 +9,7 @@ from typing import Literal
 
 from cyclopts import App, CycloptsError, UnusedCliTokensError
 
-from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, one_line
+from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, is_out_of_memory, one_line, reason
 from shadowpuppet.output import say, say_text
 
 COMMANDS = {
@@ -84,6 +84,12 @@ def run(tokens: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as interrupt:
         say(f"interrupted{': ' if interrupt.args else ''}{' '.join(map(str, interrupt.args))}", error=True)
         return INTERRUPTED
+    except Exception as error:
+        if not is_out_of_memory(error):
+            raise
+        say(f"error: the memory of this machine does not suffice ({one_line(reason(error))}); a lower --max-size, a shorter part of the "
+            "film or fewer cameras need less", error=True)
+        return MISTAKE
     return code if isinstance(code, int) else 0
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from shadowpuppet.errors import VideoError, check_regular, reason, warn
 from shadowpuppet.threads import thread_limit
-from shadowpuppet.video.frames import ASSUMED_RATE, EVERY, Frame, FrameSource, Image, Wanted, check_size, size_of
+from shadowpuppet.video.frames import ASSUMED_RATE, EVERY, Frame, FrameSource, Image, Wanted, check_size, size_of, within_memory
 from shadowpuppet.video.selection import Irregular, Select, Stamped, chosen
 
 if TYPE_CHECKING:
@@ -153,11 +153,12 @@ def opened(path: Path, threads: int | None = None) -> Iterator[tuple[InputContai
     try:
         check_regular(path)
         # "file:" and the white list: a name with a colon is no protocol, and a play list cannot open other files or addresses.
-        container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
+        with within_memory(path):
+            container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
     except (OSError, av.error.FFmpegError) as error:
         raise VideoError(f"{path}: no film that can be read ({reason(error)}); an .mp4 that was cut off while being written "
                          "lacks its index and cannot be played") from None
-    with container:
+    with within_memory(path), container:
         streams = [s for s in container.streams.video if not s.disposition & s.disposition.attached_pic]
         if not streams or container.format.name == "tty":  # FFmpeg renders text files as video
             raise VideoError(f"{path}: no video stream in it; a film or a picture is expected")
@@ -167,7 +168,7 @@ def opened(path: Path, threads: int | None = None) -> Iterator[tuple[InputContai
 
 
 def decoded(container: InputContainer, stream: VideoStream, needless: Callable[[Packet], bool] | None = None) -> Iterator[VideoFrame]:
-    """Frames in order of presentation. Raises `Break` after the last undamaged frame of a damaged film.
+    """Frames in order of presentation. Raises `Break` after the last undamaged frame of a damaged film, `MemoryError`.
 
     needless: whether a packet's frame is not wanted, so that it is left out if no other refers to it: half of a film's frames, often.
     """
@@ -184,6 +185,8 @@ def decoded(container: InputContainer, stream: VideoStream, needless: Callable[[
                 frames, broken = _held(stream, last), "a cut picture"
             else:
                 frames = packet.decode()
+        except MemoryError:  # no damage
+            raise
         except (OSError, av.error.FFmpegError) as error:
             frames, broken = _held(stream, last), reason(error)
         for frame in frames:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.errors import VideoError, check_regular, choices, reason, warn
-from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, Wanted, check_size, size_of
+from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, Wanted, check_size, size_of, within_memory
 
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
 
@@ -24,8 +24,9 @@ def read_image(path: str | Path, grey: bool = False) -> Image:
 
     try:
         check_regular(Path(path))
-        data = np.frombuffer(Path(path).read_bytes(), np.uint8)  # cv2.imread cannot open every name on every system
-        image = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR) if data.size else None
+        with within_memory(path):
+            data = np.frombuffer(Path(path).read_bytes(), np.uint8)  # cv2.imread cannot open every name on every system
+            image = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR) if data.size else None
     except OSError as error:
         raise VideoError(f"{path}: the picture cannot be read ({reason(error)})") from None
     except cv2.error:
