@@ -70,8 +70,8 @@ class PageHandler(BaseHTTPRequestHandler):
 
     def setup(self) -> None:
         """Give the client `SEND_SECONDS` for each piece that it is sent."""
-        self.timeout = SEND_SECONDS  # of the socket
         super().setup()
+        self.connection.settimeout(SEND_SECONDS)
         self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, PIECE)
 
     def handle_one_request(self) -> None:
