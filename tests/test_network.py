@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from shadowpuppet import network
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.network import (
+    Connections,
     are_origins_allowed,
     has_screen,
     host_and_port,
@@ -159,3 +160,16 @@ def test_a_page_of_the_same_server_is_one_of_the_same_host_and_port(origins, sam
 ])  # fmt: skip
 def test_origins_are_allowed_by_name(origins, allowed, good):
     assert are_origins_allowed(request(*(("Origin", origin) for origin in origins)), frozenset(allowed)) == good
+
+
+@given(st.lists(st.sampled_from("abc")), st.integers(0, 5), st.integers(0, 3))
+def test_connections_are_counted_in_all_and_of_each_address(asking, most, most_of_address):
+    found, kept = Connections(most, most_of_address), []
+    for address in asking:
+        there_is = len(kept) < most and kept.count(address) < most_of_address
+        assert found.has_room(address) == found.enter(address) == there_is
+        kept += [address] * there_is
+        assert len(found) == len(kept)
+    for address in kept:
+        found.leave(address)
+    assert (len(found), len(found._of)) == (0, 0)

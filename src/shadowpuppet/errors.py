@@ -24,11 +24,17 @@ LONGEST = 2000
 """Number of characters of a message beyond which its middle is left out."""
 
 
-def one_line(text: object) -> str:
-    """A message on one line, without control characters and of limited length: names and values in it may come from anywhere."""
+def printable(text: object) -> str:
+    """A text on one line, without control characters: names and values in it may come from anywhere."""
     line = str(text)
-    if not line.isprintable():
-        line = "".join(each if each.isprintable() else " " if each.isspace() else "\ufffd" for each in line)
+    if line.isprintable():
+        return line
+    return "".join(each if each.isprintable() else " " if each.isspace() else "\ufffd" for each in line)
+
+
+def one_line(text: object) -> str:
+    """A `printable` message of limited length."""
+    line = printable(text)
     return line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
 
 
@@ -130,7 +136,12 @@ def shown(value: object) -> str:
 
 def reason(error: BaseException) -> str:
     """What the system or a codec says of an error, without its number and path."""
-    return (getattr(error, "strerror", None) or str(error) or "unknown reason").lower()
+    return (getattr(error, "strerror", None) or str(error) or ("out of memory" if is_out_of_memory(error) else "unknown reason")).lower()
+
+
+def is_out_of_memory(error: BaseException) -> bool:
+    """Whether an error says that memory does not suffice: Python's, NumPy's and FFmpeg's are `MemoryError`, OpenCV's has a code."""
+    return isinstance(error, MemoryError) or (type(error).__module__ == "cv2" and getattr(error, "code", None) == -4)
 
 
 def check_regular(path: Path) -> None:

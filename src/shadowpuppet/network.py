@@ -7,16 +7,18 @@ import ipaddress
 import os
 import socket
 import sys
+import threading
+from collections import Counter
 from collections.abc import Callable
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
 from shadowpuppet.errors import SettingsError, reason
 
-MAX_CONNECTIONS = 32
-"""Connections that each server keeps open at a time."""
-REQUEST_SECONDS = 5.0
-"""Time within which a client must have sent its request."""
+MAX_CONNECTIONS, MAX_OF_ADDRESS = 32, 16
+"""Connections that each server keeps open at a time: in all, and with one address."""
+REQUEST_SECONDS, SEND_SECONDS = 5.0, 5.0
+"""Time within which a client must have sent its request, and within which it must have read a piece of the answer."""
 LOCAL = "127.0.0.1"
 """The loopback address."""
 Server = TypeVar("Server")
@@ -144,6 +146,38 @@ def page_headers(policy: str) -> dict[str, str]:
     return {"Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer",
             "Cross-Origin-Resource-Policy": "same-origin",
             "Content-Security-Policy": f"{policy}; frame-ancestors 'none'"}
+
+
+class Connections:
+    """Counts a server's connections, of each address and in all. Thread-safe."""
+
+    def __init__(self, most: int, most_of_address: int) -> None:
+        """The greatest numbers."""
+        self.most, self.most_of_address = most, most_of_address
+        self._of = Counter[str]()
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        """Number of connections that are counted."""
+        return self._of.total()
+
+    def has_room(self, address: str) -> bool:
+        """Whether one more connection with an address may be kept."""
+        return len(self) < self.most and self._of[address] < self.most_of_address
+
+    def enter(self, address: str) -> bool:
+        """Count a connection with an address; False, and nothing is counted, if there are too many already."""
+        with self._lock:
+            if not self.has_room(address):
+                return False
+            self._of[address] += 1
+            return True
+
+    def leave(self, address: str) -> None:
+        """Count a connection no more, which was counted."""
+        with self._lock:
+            self._of[address] -= 1
+            self._of += Counter()  # forgets addresses without any
 
 
 def silent_logger(name: str) -> Any:

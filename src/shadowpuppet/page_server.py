@@ -1,4 +1,4 @@
-"""An HTTP server for a page on this machine: few connections, slow requests ended, other host names refused."""
+"""An HTTP server for a page on this machine: few connections, slow clients dropped, other host names and pages of other origins refused."""
 
 from __future__ import annotations
 
@@ -10,26 +10,43 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from shadowpuppet.network import MAX_CONNECTIONS, REQUEST_SECONDS, address_family, is_loopback, is_own_host
+from shadowpuppet.network import (
+    MAX_CONNECTIONS,
+    MAX_OF_ADDRESS,
+    REQUEST_SECONDS,
+    SEND_SECONDS,
+    Connections,
+    address_family,
+    is_loopback,
+    is_own_host,
+    is_same_origin,
+)
+
+PIECE = 65536
+"""Bytes of an answer that are sent at a time, and kept for a client that does not read them."""
 
 
 class PageServer(ThreadingHTTPServer):
-    """Answers each connection in a thread of its own, `MAX_CONNECTIONS` at a time."""
+    """Answers each connection in a thread of its own, `MAX_CONNECTIONS` at a time, of them `MAX_OF_ADDRESS` with one address."""
 
     daemon_threads = True
     allow_reuse_address = False
 
     def __init__(self, handler: type[PageHandler], listen: str, port: int) -> None:
         """Listen at an address and port (0: any). Raises `OSError` if these are not available."""
-        self._free = threading.Semaphore(MAX_CONNECTIONS)
+        self._connections = Connections(MAX_CONNECTIONS, MAX_OF_ADDRESS)
         self.loopback, self.address_family = is_loopback(listen), address_family(listen)
         super().__init__((listen, port), handler)
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Answer in a thread of its own, or close the connection if there are `MAX_CONNECTIONS` already."""
-        if self._free.acquire(blocking=False):
+        """Answer in a thread of its own, or close the connection if there are too many already."""
+        if not self._connections.enter(client_address[0]):
+            self.shutdown_request(request)
+            return
+        try:
             super().process_request(request, client_address)
-        else:
+        except RuntimeError:  # there is no thread for it
+            self._connections.leave(client_address[0])
             self.shutdown_request(request)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
@@ -37,7 +54,7 @@ class PageServer(ThreadingHTTPServer):
         try:
             super().process_request_thread(request, client_address)
         finally:
-            self._free.release()
+            self._connections.leave(client_address[0])
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Ignore connections that a browser closed."""
@@ -48,9 +65,14 @@ class PageHandler(BaseHTTPRequestHandler):
 
     server: PageServer  # pyright: ignore[reportIncompatibleVariableOverride]
     server_version, sys_version = "shadowpuppet", ""
-    timeout = 30
     page_headers: Mapping[str, str] = {}
     """Headers of every answer."""
+
+    def setup(self) -> None:
+        """Give the client `SEND_SECONDS` for each piece that it is sent."""
+        super().setup()
+        self.connection.settimeout(SEND_SECONDS)
+        self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, PIECE)
 
     def handle_one_request(self) -> None:
         """Answer one request; the connection is closed if it has not come within `REQUEST_SECONDS`, however slowly it comes."""
@@ -77,16 +99,24 @@ class PageHandler(BaseHTTPRequestHandler):
         """Log nothing."""
 
     def is_accepted(self) -> bool:
-        """Whether the request names this machine as its host; else it is refused."""
-        if is_own_host(self.headers, self.server.loopback):
+        """Whether the request names this machine as its host and comes from no page of another origin; else it is refused."""
+        if not is_own_host(self.headers, self.server.loopback):
+            self.refuse(HTTPStatus.MISDIRECTED_REQUEST, "this page is served under the machine's own address only")
+        elif not is_same_origin(self.headers):
+            self.refuse(HTTPStatus.FORBIDDEN, "this page is served to itself only")
+        else:
             return True
-        self.refuse(HTTPStatus.MISDIRECTED_REQUEST, "this page is served under the machine's own address only")
         return False
 
     def answer(self, body: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
         """Send a whole answer of a content type."""
         self.begin(kind, status, len(body))
-        self.wfile.write(body)
+        self.send(body)
+
+    def send(self, data: bytes) -> None:
+        """Send bytes. Raises `OSError` if the client does not read a piece of them within `SEND_SECONDS`."""
+        for start in range(0, len(data), PIECE):
+            self.wfile.write(data[start : start + PIECE])
 
     def refuse(self, status: HTTPStatus, why: str) -> None:
         """Send a status and a line that says why."""

@@ -39,6 +39,44 @@ def test_control_c_while_the_program_is_loaded_is_no_traceback(name):
     assert len(done.stderr.splitlines()) == 1
 
 
+AT_THE_END = """
+import os, signal, sys, threading
+from shadowpuppet.cli import app, entry
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # even where the tests run in the background
+
+def work():
+    while signal.getsignal(signal.SIGINT) is signal.default_int_handler and not over.wait(0.01):
+        pass
+    os.kill(os.getpid(), signal.SIGINT)
+    over.wait(600)
+
+def run():
+    threading.Thread(target=work).start()
+    threading.Timer({seconds}, over.set).start()
+    return {code}
+
+over = threading.Event()
+app.run = run
+entry.main()
+"""
+
+
+@pytest.mark.parametrize("code", [0, 130])
+def test_control_c_while_only_threads_are_waited_for_ends_at_once(code):
+    done = subprocess.run([sys.executable, "-c", AT_THE_END.format(code=code, seconds=60)], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+def test_a_second_control_c_while_the_first_is_told_is_no_traceback():
+    code = ("import os, signal\nfrom shadowpuppet.cli import app, entry\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+            "def run(*_, **__):\n    raise KeyboardInterrupt\n"
+            "def second(*_, **__):\n    os.kill(os.getpid(), signal.SIGINT)\n    raise SystemExit(7)\n"
+            "app.app.__class__.__call__ = run\napp.say = second\nentry.main()")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+
+
 def test_a_library_that_cannot_be_loaded_is_said_in_a_line():
     code = "import sys; sys.modules['pydantic'] = None; from shadowpuppet.cli.entry import main; main()"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -127,7 +127,7 @@ def test_verdicts(printed):
 def test_files_that_are_there_are_named(tmp_path):
     for name in ("b.csv", "c.mp4"):
         (tmp_path / name).touch()
-    assert files_in(tmp_path, "a.csv", "b.csv", "c.mp4") == ("made", f"{tmp_path / 'b.csv'}\n{tmp_path / 'c.mp4'}")
+    assert files_in(tmp_path, "a.csv", "b.csv", "c.mp4") == ("made", [str(tmp_path / "b.csv"), str(tmp_path / "c.mp4")])
 
 
 def test_parts_stand_apart(printed):

@@ -183,6 +183,18 @@ def test_other_sites_cannot_press_buttons(page):
     assert page.command() == ""
 
 
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:1", "https://localhost"])
+def test_pages_of_other_origins_are_refused(page, origin):
+    page.show(tracked())
+    for path in ("/", "/page.js", "/picture.jpg", "/picture.mjpeg", "/events"):
+        answer, body = ask(page, path, headers={"Origin": origin})
+        assert (answer.status, body) == (403, b"this page is served to itself only\n")
+    assert ask(page, "/command/stop", "POST", {"Origin": origin, "X-Shadowpuppet": "1"})[0].status == 403
+    assert page.command() == ""
+    own = {"Origin": page.address.rstrip("/"), "X-Shadowpuppet": "1"}
+    assert ask(page, "/", headers=own)[0].status == ask(page, "/command/stop", "POST", own)[0].status == 200
+
+
 @pytest.mark.parametrize("path", ["/", "/picture.jpg", "/picture.mjpeg", "/events"])
 def test_names_that_were_turned_to_this_machine_are_refused(page, path):
     page.show(tracked())
@@ -218,6 +230,54 @@ def test_no_more_than_so_many_are_served_and_who_leaves_makes_room(monkeypatch):
                 if ask(page, "/")[0].status == 200:
                     break
             assert time.monotonic() < end, "a connection that ended still counts"
+            time.sleep(0.01)
+
+
+def test_one_address_does_not_take_all_connections(monkeypatch):
+    monkeypatch.setattr(page_server, "MAX_OF_ADDRESS", 2)
+    with WebDisplay(port=0) as page:
+        address = ("127.0.0.1", page.server.server_port)
+        with socket.create_connection(address), socket.create_connection(address), socket.create_connection(address) as third:
+            third.settimeout(10)
+            with contextlib.suppress(ConnectionError):
+                third.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+                assert third.recv(1) == b""
+            try:
+                other = socket.create_connection(address, source_address=("127.0.0.2", 0))
+            except OSError:
+                pytest.skip("this machine has one address of its own")
+            with other:
+                other.settimeout(10)
+                other.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+                assert other.recv(100).split(b"\r\n")[0].split()[1] == b"200"
+
+
+def reading_nothing(port: int, path: str) -> socket.socket:
+    """A client with little room that asks and does not read."""
+    raw = socket.socket()
+    raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    raw.connect(("127.0.0.1", port))
+    raw.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
+    return raw
+
+
+def test_clients_that_read_nothing_are_dropped_and_the_page_comes(monkeypatch):
+    """Without a limit of the time to send, they would keep others out as long as they like."""
+    monkeypatch.setattr(page_server, "SEND_SECONDS", 0.2)
+    monkeypatch.setattr(page_server, "MAX_OF_ADDRESS", 3)
+    view = tracked(image=np.random.default_rng(1).integers(0, 255, (720, 960, 3), np.uint8), mask=None, picture=None, pose=None)
+    with contextlib.ExitStack() as stack:
+        page = stack.enter_context(WebDisplay(port=0))
+        page.show(view)
+        for _ in range(3):
+            stack.enter_context(reading_nothing(page.server.server_port, "/picture.mjpeg"))
+        end = time.monotonic() + 20
+        while True:
+            page.show(view)
+            with contextlib.suppress(OSError, http.client.HTTPException):
+                if ask(page, "/")[0].status == 200:
+                    break
+            assert time.monotonic() < end, "clients that read nothing are still kept"
             time.sleep(0.01)
 
 

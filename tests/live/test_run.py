@@ -285,6 +285,44 @@ def test_control_c_before_anybody_is_tracked_leaves_nothing(film, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+TWICE = """
+import os, signal, sys
+from shadowpuppet.live import run
+
+end = run._Live._give
+
+def second(self, given):
+    end(self, given)
+    if self.stop.wished:
+        os.kill(os.getpid(), signal.SIGINT)
+
+run._Live._give = second
+sys.argv = ["shadowpuppet", *sys.argv[1:]]
+from shadowpuppet.cli.entry import main
+main()
+"""
+"""A session that hears a second Ctrl-C as soon as it heeds the first."""
+
+
+@pytest.mark.parametrize("tracked", [False, True])
+def test_a_second_control_c_aborts(film, tmp_path, tracked):
+    folder, heeding = tmp_path / "run", functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    tokens = [sys.executable, "-c", TWICE, *command(film, folder, countdown=0.2 if tracked else 60), *FLAGS]
+    child = subprocess.Popen(tokens, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heeding)
+    rows = folder / "joints.csv"
+    assert child.stderr is not None
+    assert any("step out of the picture" in line for line in iter(child.stderr.readline, ""))
+    while tracked and child.poll() is None and (not rows.exists() or rows.read_text().count("\n") < 6):
+        time.sleep(0.02)
+    child.send_signal(signal.SIGINT)
+    out, err = child.communicate(timeout=300)
+    assert (child.returncode, out) == (130, "")
+    assert "Traceback" not in err
+    assert err.splitlines()[-1].startswith("interrupted: the" if tracked else "interrupted: nothing was written")
+    assert folder.exists() == tracked
+    assert not tracked or not read_run(folder).complete
+
+
 # Other programs
 
 

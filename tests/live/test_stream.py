@@ -329,7 +329,8 @@ def test_a_name_that_another_site_turned_to_this_machine_and_two_hosts_are_refus
         assert outlet.counts()["refused"] == 1
 
 
-def test_who_is_slow_gets_the_newest_frame_and_holds_nobody_up():
+def test_who_is_slow_gets_the_newest_frame_and_holds_nobody_up(monkeypatch):
+    monkeypatch.setattr(websocket, "SEND_SECONDS", 600)
     who, number = subject("anatomical"), 1500
     told = posed(who)
     with served() as (outlet, url), raw_listener(outlet.port) as slow, connect(url) as quick:
@@ -346,6 +347,22 @@ def test_who_is_slow_gets_the_newest_frame_and_holds_nobody_up():
         assert times == sorted(times)
         assert len(times) < number / 2
         assert len(seen) > 40
+
+
+def test_who_reads_nothing_makes_room(monkeypatch):
+    monkeypatch.setattr(websocket, "SEND_SECONDS", 0.2)
+    monkeypatch.setattr(websocket, "MAX_OF_ADDRESS", 1)
+    who, end = subject("anatomical"), time.monotonic() + 20
+    with served() as (outlet, url), raw_listener(outlet.port):
+        with pytest.raises(InvalidStatus):
+            connect(url)
+        outlet.begin(who)
+        while len(outlet._clients):
+            outlet.send(posed(who)._replace(time=time.monotonic()))
+            assert time.monotonic() < end, "a client that reads nothing is still counted"
+            time.sleep(0.0005)
+        with connect(url) as connection:
+            assert json.loads(connection.recv(5))["type"] == "begin"
 
 
 def test_who_hangs_does_not_hold_up_the_end():
@@ -401,7 +418,7 @@ def test_no_more_than_so_many_listen_and_who_leaves_makes_room(monkeypatch):
         with connect(url), pytest.raises(InvalidStatus):
             connect(url)
         end = time.monotonic() + 10
-        while outlet._clients > 1:
+        while len(outlet._clients) > 1:
             assert time.monotonic() < end, "a client that left is still counted"
             time.sleep(0.01)
         with connect(url):

@@ -531,6 +531,13 @@ def test_what_a_page_may_fetch_and_texts_of_others_cannot_be_script():
     assert "'unsafe" not in alone + served
 
 
+@pytest.mark.parametrize("name", ["@SCRIPT@", "@DATA@", "@POLICY@", "@STYLE@", "@TITLE@", r"\g<1> \1 @NONE@"])
+def test_names_that_look_like_places_of_the_template_stay_names(name):
+    usual, page = (page_text(Scene(title=each, times=np.zeros(1), facts={"camera": each}), [], [], False) for each in ("walk-on", name))
+    assert page.replace(json.dumps(name)[1:-1], "walk-on").replace(name, "walk-on") == usual
+    assert content(page)["title"] == content(page)["facts"]["camera"] == name
+
+
 def test_a_file_has_pictures_only_where_they_are_asked_for(tracked, tmp_path):
     """What is in the file: silhouettes of two colours, or pictures."""
     scene = cut_scene(open_scene(tracked), 0.0, 0.2)

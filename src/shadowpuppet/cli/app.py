@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from collections.abc import Sequence
@@ -10,7 +9,8 @@ from typing import Literal
 
 from cyclopts import App, CycloptsError, UnusedCliTokensError
 
-from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, one_line
+from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, is_out_of_memory, one_line, reason
+from shadowpuppet.output import say, say_text
 
 COMMANDS = {
     "track": "track:track", "live": "track:live", "play": "track:play", "demo": "track:demo", "fit-person": "track:fit_person",
@@ -47,8 +47,9 @@ def settings(*, preset: str = "default") -> None:
     from shadowpuppet.pipeline.options import make_options, options_text
 
     text = options_text(make_options({"preset": preset}))  # before anything is printed, as the preset may be unknown
-    print("# Settings of `shadowpuppet track`; a setting particles in the table [tracker.arm] is the flag --tracker.arm.particles.\n")
-    print(text)
+    say("# Settings of `shadowpuppet track`; a setting particles in the table [tracker.arm] is the flag --tracker.arm.particles.")
+    say("")
+    say_text(text)
 
 
 def completion(shell: Literal["bash", "zsh", "fish", "powershell"], /) -> None:
@@ -66,7 +67,7 @@ def completion(shell: Literal["bash", "zsh", "fish", "powershell"], /) -> None:
     function = re.search(r"^(_\w+)\(\)", script, re.MULTILINE)
     if shell == "zsh" and function is not None:  # zsh reads such scripts from its own folders; evaluated, they do nothing by themselves
         script += f"\ncompdef {function[1]} shadowpuppet"
-    print(script)
+    say_text(script)
 
 
 def run(tokens: Sequence[str] | None = None) -> int:
@@ -78,14 +79,17 @@ def run(tokens: Sequence[str] | None = None) -> int:
         code = app(list(tokens), exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except (ShadowPuppetError, CycloptsError) as error:
-        print(f"error: {' '.join(_told(error).split())}", file=sys.stderr)
+        say(f"error: {' '.join(_told(error).split())}", error=True)
         return MISTAKE
     except KeyboardInterrupt as interrupt:
-        print(f"interrupted{': ' if interrupt.args else ''}{' '.join(map(str, interrupt.args))}", file=sys.stderr)
+        say(f"interrupted{': ' if interrupt.args else ''}{' '.join(map(str, interrupt.args))}", error=True)
         return INTERRUPTED
-    except BrokenPipeError:  # as of `| head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    except Exception as error:
+        if not is_out_of_memory(error):
+            raise
+        say(f"error: the memory of this machine does not suffice ({one_line(reason(error))}); a lower --max-size, a shorter part of the "
+            "film or fewer cameras need less", error=True)
+        return MISTAKE
     return code if isinstance(code, int) else 0
 
 

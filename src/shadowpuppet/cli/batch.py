@@ -60,7 +60,6 @@ def batch(recordings: Annotated[list[Path], Parameter(help="Recordings, as `trac
 def _summary(batch: Batch) -> Any:
     """Table with a row per recording and choice of settings: mean and standard deviation over the seeds."""
     import numpy as np
-    from rich.text import Text
 
     from shadowpuppet.pipeline.batch.plot import MEASURES, measured, rows_of
 
@@ -70,7 +69,7 @@ def _summary(batch: Batch) -> Any:
         count = str(len(done)) if len(done) == len(runs) else f"{len(done)} of {len(runs)}"
         figures = [_spread([measured(run, place) for run in done], digits) for (place, _), digits in zip(MEASURES, (1, 3))]
         seconds = [run.seconds for run in done if run.seconds is not None]
-        rows.append((Text(name), Text(choice), count, *figures, f"{np.median(seconds):.1f}" if seconds else ""))
+        rows.append((name, choice, count, *figures, f"{np.median(seconds):.1f}" if seconds else ""))
     out = table("", ("recording", "settings", "runs", "error, mm", "overlap", "s"), rows, right=(2, 3, 4, 5))
     for column in out.columns[:2]:  # in a narrow terminal names are folded, and figures stay whole
         column.no_wrap, column.overflow = False, "fold"

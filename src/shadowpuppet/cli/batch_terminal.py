@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from shadowpuppet.cli.terminal import LOG_EVERY, LogLines, Terminal, terminal
+from shadowpuppet.errors import printable
 from shadowpuppet.pipeline.batch.run import Batch
 from shadowpuppet.pipeline.batch.summary import BatchRun
 from shadowpuppet.pipeline.batch.tasks import Task
@@ -46,7 +47,7 @@ class BatchTerminal(BatchListener):
         if not self._terminal.quiet:
             (self._live if self._terminal.console.is_terminal else self._log).start()
         if before and not self._terminal.quiet:
-            self._terminal.console.print(f"{before} of {total} runs are done already", markup=False)
+            self._terminal.console.print(f"{before} of {total} runs are done already")
 
     def working(self, worker: int, task: Task, doing: str, frames: int, total: int | None) -> None:
         """Show what a worker does."""
@@ -83,10 +84,10 @@ class BatchTerminal(BatchListener):
         self.stop()
         for why, runs in reasons.items():
             more = f" and {len(runs) - 1} more" if len(runs) > 1 else ""
-            self._terminal.console.print(f"failed: {runs[0].task.label}{more}: {why}", markup=False, soft_wrap=True)
+            self._terminal.console.print(printable(f"failed: {runs[0].task.label}{more}: {why}"), soft_wrap=True)
         if reasons:
             text = f"{len(batch.failed)} of {len(batch.runs)} runs failed; the same command tries them again"
-            self._terminal.console.print(text, markup=False)
+            self._terminal.console.print(text)
 
     def _counts(self) -> str:
         left = self.total - self.before - self.done - self.failed
@@ -107,7 +108,8 @@ class BatchTerminal(BatchListener):
         bar.add_row(ProgressBar(self.total, self.before + self.done + self.failed, width=min(max(room, 1), BAR)), counts)
         at = sorted(self._at.items())
         for number, (label, doing) in at[:LINES]:
-            workers.add_row(Text(f"{number + 1:3}", style="dim"), Text(label, overflow="ellipsis", no_wrap=True), Text(doing, no_wrap=True))
+            name, does = Text(printable(label), overflow="ellipsis", no_wrap=True), Text(printable(doing), no_wrap=True)
+            workers.add_row(Text(f"{number + 1:3}", style="dim"), name, does)
         if len(at) > LINES:
             workers.add_row("", Text(f"and {len(at) - LINES} more"), "")
         if not (at or self.done or self.failed):

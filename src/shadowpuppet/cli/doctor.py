@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from shadowpuppet.cli.tables import show
+from shadowpuppet.cli.tables import PlainConsole, show
 from shadowpuppet.errors import BROKEN, extra_command
+from shadowpuppet.output import say_text
 
 OLDEST_PYTHON = (3, 11)
 MODULES = {"opencv-python-headless": "cv2", "python-osc": "pythonosc"}
@@ -67,16 +67,16 @@ def doctor(
     """
     import json
 
-    console = Console(stderr=True, quiet=as_json)
+    console = PlainConsole(error=True, quiet=as_json)
     if warm:
         from shadowpuppet.cli.warm_up import warm_up
 
-        console.print("compiling everything, once: a minute or two", highlight=False)
+        console.print("compiling everything, once: a minute or two")
         warm_up()
     with console.status("trying what works") if console.is_terminal else nullcontext():
         found = examine()
     if as_json:
-        print(json.dumps({"works": works(found), "findings": [asdict(finding) for finding in found]}, indent=1))
+        say_text(json.dumps({"works": works(found), "findings": [asdict(finding) for finding in found]}, indent=1))
     else:
         show(*_tables(found))
     return 0 if works(found) else BROKEN

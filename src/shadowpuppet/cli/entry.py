@@ -10,6 +10,7 @@ from types import FrameType
 from typing import NoReturn
 
 from shadowpuppet.errors import BROKEN, INTERRUPTED
+from shadowpuppet.output import guard_streams, output_failure, say
 
 ENDING = ("SIGTERM", "SIGHUP")
 """Signals that end the program as Ctrl-C does; its exit code is then 128 and the signal's number."""
@@ -19,11 +20,15 @@ def main() -> NoReturn:
     """Run the command line and exit."""
     heard = list[int]()
     try:
+        guard_streams()
         _handle_signals(heard)
         code = _run()
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+        say("interrupted", error=True)
         code = INTERRUPTED
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, lambda *_: os._exit(INTERRUPTED))  # the work is over: only threads are waited for
+    code = output_failure(code)
     sys.exit(128 + heard[0] if heard and code == INTERRUPTED else code)
 
 
@@ -55,6 +60,6 @@ def _run() -> int:
         if (cause.name or "").startswith("shadowpuppet"):
             raise  # a mistake of ours
         text = " ".join(str(cause).split())
-        print(f"error: a library cannot be loaded ({text}); `python -m pip install --force-reinstall shadowpuppet` installs them all again",
-              file=sys.stderr)  # fmt: skip
+        say(f"error: a library cannot be loaded ({text}); `python -m pip install --force-reinstall shadowpuppet` installs them all again",
+            error=True)
         return BROKEN

@@ -128,7 +128,7 @@ def _tables(measured: Mapping[str, Any]) -> Iterator[Any]:
                     ((name, f"{value:.1f}", f"{aligned[name]:.1f}") for name, value in measured["angles_deg"].items()))
 
 
-def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str | list[str]]]:
     from shadowpuppet.evaluation.summary_text import (
         bones_text,
         clock_text,
@@ -169,4 +169,4 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if "dofs_deg" in measured:
         dofs = [f"{name} {value['rmse']:.1f}" for name, value in measured["dofs_deg"].items()]
         lines = [", ".join(dofs[n : n + DOFS_IN_ROW]) for n in range(0, len(dofs), DOFS_IN_ROW)]
-        yield "angles", "\n".join(lines) + "\n(rmse, degrees)"
+        yield "angles", [*lines, "(rmse, degrees)"]

@@ -116,7 +116,7 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
         side = "below" if level < 0 else "above"
         where = "the lowest foot over the film is" if whole else "the feet are by the person's height"
         floor = f"{abs(level):.2f} m {side} the camera, where {where}; at 0 in these files"
-        show(pairs([("made", "\n".join(map(str, written))), ("floor", floor if level else None)]))
+        show(pairs([("made", [*map(str, written)]), ("floor", floor if level else None)]))
 
 
 def convert(source: Annotated[Path, Parameter(help=f"File of motion: {choices(READABLE)}; .amc with its .asf beside it.")],
@@ -169,7 +169,7 @@ def explain_motion(path: Path, as_json: bool) -> None:
     show(pairs(_motion_rows(look)))
 
 
-def _motion_rows(look: MotionLook) -> Iterator[tuple[str, str | None]]:
+def _motion_rows(look: MotionLook) -> Iterator[tuple[str, str | tuple[str, ...] | None]]:
     rate = f", {look.rate:.4g} frames/s" if look.rate else ""
     ours = ", ".join(name if name == theirs else f"{name} ({theirs})" for name, theirs in look.known.items())
     others = ", ".join(look.others[:MOST_NAMES]) + (", ..." if len(look.others) > MOST_NAMES else "")
@@ -181,7 +181,7 @@ def _motion_rows(look: MotionLook) -> Iterator[tuple[str, str | None]]:
     yield "unknown", f"{100 * look.unknown:.1f} % of the positions" if look.unknown else None
     yield "legs", f"{look.leg:.2f} m from hip to ankle" if look.leg else None
     yield "analog", f"{len(look.channels)}, not read: {', '.join(look.channels[:MOST_NAMES])}" if look.channels else None
-    yield "read", "\n".join(look.notes) or None
+    yield "read", look.notes or None
 
 
 def _prior_tables(trained: TrainedPrior, file: Path) -> Iterator[Any]:

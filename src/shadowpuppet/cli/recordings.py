@@ -30,6 +30,7 @@ from shadowpuppet.cli.flags import (
 )
 from shadowpuppet.cli.tables import pairs, show, show_json, show_next
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, choices, reason, typed
+from shadowpuppet.output import say_text
 from shadowpuppet.settings import validate
 from shadowpuppet.synthetic.collection import named_specs
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
@@ -103,7 +104,7 @@ def synthesize(spec: Annotated[Path | None, Parameter(help="Spec file, TOML, as 
         return show(pairs((name, _spec_line(known)) for name, known in named_specs().items()))
     chosen = spec_of(spec, like, seed, flags)
     if show_spec:
-        return print(spec_text(chosen), end="")
+        return say_text(spec_text(chosen).removesuffix("\n"))
     from shadowpuppet.pipeline.synthesize import make_recording
 
     folder = folder or Path(chosen.name)

@@ -1,17 +1,22 @@
-"""Tables of 80 columns on standard output: the helpers, and the tables that several commands show."""
+"""Tables of 80 columns on standard output: the helpers, and the tables that several commands show.
+
+Names and values in tables may come from anywhere: nothing in them is markup, and no control character is printed."""
 
 from __future__ import annotations
 
-import sys
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType
 from rich.measure import Measurement
+from rich.segment import Segment
 from rich.table import Table
-from rich.text import Text
+
+from shadowpuppet.errors import printable
+from shadowpuppet.output import say, say_text, without_controls
 
 if TYPE_CHECKING:
     from shadowpuppet.pipeline.verdict.verdict import Verdict
@@ -24,17 +29,30 @@ ANY_WIDTH = 10_000
 """Columns that are more than any table needs."""
 
 
+class PlainConsole(Console):
+    """A console that takes no text for markup, and prints no control characters but its own."""
+
+    def __init__(self, error: bool = False, quiet: bool = False) -> None:
+        """On standard output, or standard error if `error`; prints nothing if `quiet`."""
+        super().__init__(stderr=error, quiet=quiet, highlight=False, markup=False, emoji=False)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """The segments that a renderable is printed as."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else Segment(without_controls(segment.text), segment.style)
+
+
 def show(*parts: RenderableType) -> None:
     """Print tables with an empty line between them; where there is no terminal, as wide as they need, so that nothing is cut off."""
-    console = Console(file=sys.stdout, highlight=False)
+    console = PlainConsole()
     usual = console.width
     for n, part in enumerate(parts):
         if not console.is_terminal:
             console.width = max(usual, _least_width(console, part))
         with console.capture() as captured:
-            console.print(part)
+            console.print(printable(part) if isinstance(part, str) else part)
         lines = [line.rstrip() for line in captured.get().splitlines()]  # rich pads columns with blanks
-        print("\n" * bool(n) + "\n".join(lines))
+        print("\n" * bool(n) + "\n".join(lines))  # noqa: T201 - with the terminal's own colours
 
 
 def _least_width(console: Console, part: RenderableType) -> int:
@@ -48,36 +66,39 @@ def _least_width(console: Console, part: RenderableType) -> int:
 
 def show_next(*commands: str) -> None:
     """Print commands to try next, each on one line however long it is, so that it can be pasted."""
-    print("\nnext", *commands, sep="\n  ")
+    say("")
+    say("next")
+    for command in commands:
+        say(f"  {command}")
 
 
 def show_json(value: Any) -> None:
-    """Print a value as JSON."""
+    """Print a value as JSON; control characters in names are escaped."""
     from shadowpuppet.pipeline.track import json_text
 
-    print(json_text(value))
+    say_text("".join(sign if sign.isprintable() or sign == "\n" else json.dumps(sign)[1:-1] for sign in json_text(value)))
 
 
-def pairs(rows: Iterable[tuple[str, str | None]]) -> Table:
-    """Table of names and values; rows without a value (None) are left out."""
+def pairs(rows: Iterable[tuple[str, str | Sequence[str] | None]]) -> Table:
+    """Table of names and values, each a line or several; rows without a value (None) are left out."""
     grid = Table.grid(padding=(0, 2))
     grid.add_column(no_wrap=True, style="bold")
     grid.add_column(overflow="fold")
     for name, value in rows:
         if value is not None:
-            grid.add_row(Text(name), Text(value))
+            grid.add_row(printable(name), printable(value) if isinstance(value, str) else "\n".join(map(printable, value)))
     return grid
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[int] | None = None) -> Table:
     """A table without lines, its columns `right` (default: all but the first) aligned to the right; a row "all" is set off."""
-    out = Table(title=title, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0), header_style="dim")
+    out = Table(title=printable(title), title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0), header_style="dim")
     for n, column in enumerate(columns):
         out.add_column(column, justify="right" if (n in right if right is not None else n) else "left", no_wrap=True)
     for row in rows:
         if row[0] == "all":
             out.add_section()
-        out.add_row(*row)
+        out.add_row(*map(printable, row))
     return out
 
 
@@ -100,9 +121,9 @@ def verdict_of(plain: Mapping[str, Any], title: str) -> RenderableType:
     return verdict_table(Verdict(plain["word"], tuple(plain["reasons"])), title)
 
 
-def files_in(folder: Path, *names: str) -> tuple[str, str]:
+def files_in(folder: Path, *names: str) -> tuple[str, list[str]]:
     """The row that names those files of a folder that exist."""
-    return "made", "\n".join(str(folder / name) for name in names if (folder / name).exists())
+    return "made", [str(folder / name) for name in names if (folder / name).exists()]
 
 
 def error_table(errors: Mapping[str, Any]) -> RenderableType:

@@ -11,13 +11,12 @@ from pathlib import Path
 from time import monotonic
 from typing import TextIO
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, Task, TaskID, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
 from shadowpuppet.cli.look_tables import look_table
-from shadowpuppet.cli.tables import show, verdict_table
-from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.cli.tables import PlainConsole, show, verdict_table
+from shadowpuppet.errors import ShadowPuppetWarning, printable
 from shadowpuppet.live.display.listener import LiveListener
 from shadowpuppet.pipeline.look import Look, RigLook
 from shadowpuppet.pipeline.verdict.verdict import verdict_of_look
@@ -33,7 +32,7 @@ REPEAT_AFTER = 10.0
 class LogLines:
     """Progress as lines, for output that is no terminal: a thread prints what `line` gives, each time `pause` seconds later."""
 
-    def __init__(self, console: Console, line: Callable[[], str], pause: Callable[[], float]) -> None:
+    def __init__(self, console: PlainConsole, line: Callable[[], str], pause: Callable[[], float]) -> None:
         """Nothing is printed before `start`."""
         self.console, self._line, self._pause = console, line, pause
         self._end: threading.Event | None = None
@@ -55,13 +54,13 @@ class LogLines:
 
     def _run(self, end: threading.Event) -> None:
         while not end.wait(self._pause()):
-            self.console.print(f"{PROGRESS} {self._line()}{_compiling()}", markup=False, soft_wrap=True)
+            self.console.print(printable(f"{PROGRESS} {self._line()}{_compiling()}"), soft_wrap=True)
 
 
 class _Log(LogLines):
     """What is being done, every `LOG_EVERY` seconds."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: PlainConsole) -> None:
         super().__init__(console, self._text, lambda: LOG_EVERY)
         self.what, self.total, self.done, self.before, self.began = "", None, 0, 0, 0.0
 
@@ -101,7 +100,7 @@ class Terminal(LiveListener):
     def __init__(self, quiet: bool = False, verbose: bool = False) -> None:
         """`quiet`: show only warnings; `verbose`: also all that a look found."""
         self.quiet, self.verbose, self.frames = quiet, verbose, 0
-        self.console = Console(stderr=True, highlight=False)
+        self.console = PlainConsole(error=True)
         self._progress = Progress(_What(""), BarColumn(30), TextColumn("{task.fields[done]}"),
                                   TimeRemainingColumn(), console=self.console, transient=True,
                                   disable=quiet or not self.console.is_terminal)
@@ -112,6 +111,7 @@ class Terminal(LiveListener):
 
     def begin(self, what: str, total: int | None = None) -> None:
         """Start the progress bar of a phase; without a terminal, lines of progress."""
+        what = printable(what)
         if self._log is not None:
             self._log.begin(what, total)
         if self._task is not None:
@@ -147,23 +147,24 @@ class Terminal(LiveListener):
 
     def warn(self, message: str) -> None:
         """Print a warning on one line, once."""
-        line = f"warning: {' '.join(message.split())}"
+        line = printable(f"warning: {' '.join(message.split())}")
         if line not in self._said:
             self._said.add(line)
-            self.console.print(line, markup=False, soft_wrap=True)
+            self.console.print(line, soft_wrap=True)
 
     def note(self, message: str) -> None:
         """Show a message as the current phase; and on a line of its own unless that was just printed."""
+        message = printable(message)
         now, text = monotonic(), message.rpartition(": ")[0] or message
         if not self.quiet:
             self.begin(message)
             if text not in self._noted or now - self._noted[text] > REPEAT_AFTER:
-                self.console.print(message, markup=False, soft_wrap=True)
+                self.console.print(message, soft_wrap=True)
             self._noted[text] = now
 
     def trouble(self, message: str) -> None:
         """Print that no pictures come."""
-        self.console.print(f"warning: {' '.join(message.split())}", markup=False, soft_wrap=True)
+        self.console.print(printable(f"warning: {' '.join(message.split())}"), soft_wrap=True)
 
     def stop(self) -> None:
         """Remove the progress bar, or end the lines of progress."""

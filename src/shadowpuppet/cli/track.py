@@ -29,6 +29,7 @@ from shadowpuppet.cli.tables import error_table, files_in, metrics_table, pairs,
 from shadowpuppet.errors import PERSON_LOST, SettingsError, ShadowPuppetError, typed
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.stream.settings import OutletSettings
+from shadowpuppet.output import say
 from shadowpuppet.pipeline.options import PATHS, Options
 from shadowpuppet.settings import validate
 
@@ -75,7 +76,7 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
             summary = track_recording(recording, folder, options, listener, resume=resume)
         motion, metrics = summary.motion, summary.metrics
     except CompleteRun as error:
-        print(error, file=sys.stderr)
+        say(error, error=True)
         motion, metrics = read_run(folder).motion, read_run(folder).metrics
     if "people" in metrics:
         return _people_done(folder, metrics, quiet)
@@ -84,7 +85,7 @@ def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Fol
         _show_project(recording, folder)
     if lost_share(motion) <= MOSTLY_LOST:
         return 0
-    print(f"the person is lost: {'; '.join(metrics.get('verdict', {}).get('reasons', ()))}", file=sys.stderr)
+    say(f"the person is lost: {'; '.join(metrics.get('verdict', {}).get('reasons', ()))}", error=True)
     return PERSON_LOST
 
 
@@ -95,7 +96,7 @@ def _show_project(recording: Path, folder: Path) -> None:
     project = find_project(recording)
     if project is not None:
         formats, results = project.results
-        print(f"for {project.program}: {typed('export', folder, '--to', formats, '-o', results)}")
+        say(f"for {project.program}: {typed('export', folder, '--to', formats, '-o', results)}")
 
 
 def _people_done(folder: Path, metrics: Mapping[str, Any], quiet: bool) -> int:
@@ -114,7 +115,7 @@ def _people_done(folder: Path, metrics: Mapping[str, Any], quiet: bool) -> int:
     lost = [number for number, each in people.items() if is_lost(each["status"], each["frames"])]
     if len(lost) < len(people):
         return 0
-    print("all people are lost in most frames", file=sys.stderr)
+    say("all people are lost in most frames", error=True)
     return PERSON_LOST
 
 
@@ -141,7 +142,7 @@ def _check_earlier(folder: Path, force: bool, resumes: bool = True) -> None:
     if earlier["complete"]:
         said = f"{folder}: found a complete run, expected --force, which replaces it"
     if sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty():
-        print(f"{said.partition(', expected')[0]}; replace it? [y/N] ", end="", file=sys.stderr, flush=True)
+        say(f"{said.partition(', expected')[0]}; replace it? [y/N] ", error=True, end="")
         if sys.stdin.readline().strip().lower() in ("y", "yes"):
             return
     raise ShadowPuppetError(f"{said}, or another folder (-o)")
@@ -179,7 +180,7 @@ def live(camera: Annotated[str | None, Parameter(help="The camera, or a film to 
             display = open_display(chosen.show, chosen.listen, chosen.port, chosen.record)
         metrics = run_live(folder, options, chosen, listener, display, outlets=opened)
     if metrics is None:
-        print(f"nobody was tracked: nothing was written{_after_a_film(chosen.camera)}", file=sys.stderr)
+        say(f"nobody was tracked: nothing was written{_after_a_film(chosen.camera)}", error=True)
     elif not quiet:
         show(metrics_table(metrics), pairs([*_live_rows(metrics["live"]), files_in(folder, "joints.csv", "angles.csv", "recording")]))
 
@@ -223,7 +224,8 @@ def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and 
     with terminal(quiet, folder) as listener:
         summaries = run_demo(folder, options, listener)
     for summary in () if quiet else summaries:
-        print(f"\n{'several cameras' if summary.metrics.get('cameras', 1) > 1 else 'one camera'}")
+        say("")
+        say(f"{'several cameras' if summary.metrics.get('cameras', 1) > 1 else 'one camera'}")
         _show_run(summary.folder, summary.metrics, "overlay.png")
     if not quiet:
         _show_next(folder)
@@ -232,7 +234,8 @@ def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and 
 def _show_next(folder: Path) -> None:
     """Commands to try after the demo."""
     run = folder / "run-ring"
-    print("\nA limb that is named above as doubtful is dashed in overlay.mp4, and has its own status in joints.csv.")
+    say("")
+    say("A limb that is named above as doubtful is dashed in overlay.mp4, and has its own status in joints.csv.")
     show_next(typed("view", run), typed("evaluate", run, "--report", folder / "run-ring.html"), typed("export", run, "--to", "bvh,trc"),
               typed("track", "YOUR-FILM.mp4", "--fov", "65", "--height", "1.75", "--overlay"))
 

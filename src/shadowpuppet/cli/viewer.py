@@ -9,6 +9,7 @@ from cyclopts import Group, Parameter
 
 from shadowpuppet.cli.flags import Config, Quiet, flag, flags_of, options_from, switch, unpacked
 from shadowpuppet.errors import SettingsError
+from shadowpuppet.output import say
 from shadowpuppet.pipeline.options import Options
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def view(what: Annotated[Path, Parameter(help="Folder of a run or a recording, f
             return _serve(scene, listen, port, not no_open, quiet)
         write_page(html, scene, pictures, listener)
     if not quiet:
-        print(f"made  {html}, {html.stat().st_size / 1e6:.1f} MB")
+        say(f"made  {html}, {html.stat().st_size / 1e6:.1f} MB")
 
 
 def _span(scene: Scene, start: str | None, end: str | None) -> tuple[float | None, float | None]:
@@ -99,7 +100,7 @@ def _serve(scene: Scene, listen: str, port: int | None, opening: bool, quiet: bo
 
     def ready(address: str) -> None:
         if not quiet:
-            print(f"{scene.title}: to be seen at {address}; Ctrl-C ends it", flush=True)
+            say(f"{scene.title}: to be seen at {address}; Ctrl-C ends it")
         if opening:
             open_browser(address)
 

@@ -128,7 +128,7 @@ class _Live:
                 self._open(stack)
                 self._follow()
         except KeyboardInterrupt:
-            if self.frames:
+            if self.frames or self.stop.wished:  # the second one, if `wished`
                 raise
         finally:
             self.run_.metrics |= self._measures()

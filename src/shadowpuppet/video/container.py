@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from shadowpuppet.errors import FILE_MEMORY, VideoError, check_regular, choices, reason
 from shadowpuppet.threads import thread_limit
-from shadowpuppet.video.frames import MOST_PIXELS
+from shadowpuppet.video.frames import MOST_PIXELS, within_memory
 
 if TYPE_CHECKING:
     from av.container import InputContainer
@@ -46,10 +46,11 @@ def opened(path: Path, threads: int | None = None) -> Iterator[tuple[InputContai
     try:
         check_regular(path)
         # "file:": a name with a colon is no protocol.
-        container = av.open(f"file:{path}", options=DOORS | GUARDS, metadata_errors="replace")
+        with within_memory(path):
+            container = av.open(f"file:{path}", options=DOORS | GUARDS, metadata_errors="replace")
     except (OSError, av.error.FFmpegError) as error:
         raise VideoError(_why_not(path, error)) from None
-    with container:
+    with within_memory(path), container:
         streams = [s for s in container.streams.video if not s.disposition & s.disposition.attached_pic]
         if not streams:
             raise VideoError(f"{path}: no video stream in it; a film or a picture is expected")

@@ -142,7 +142,7 @@ class Break(Exception):
 
 
 def decoded(container: InputContainer, stream: VideoStream, needless: Callable[[Packet], bool] | None = None) -> Iterator[VideoFrame]:
-    """Frames in order of presentation. Raises `Break` after the last undamaged frame of a damaged film.
+    """Frames in order of presentation. Raises `Break` after the last undamaged frame of a damaged film, `MemoryError`.
 
     needless: whether a packet's frame is not wanted, so that it is left out if no other refers to it: half of a film's frames, often.
     """
@@ -159,6 +159,8 @@ def decoded(container: InputContainer, stream: VideoStream, needless: Callable[[
                 frames, broken = _held(stream, last), "a cut picture"
             else:
                 frames = packet.decode()
+        except MemoryError:  # no damage
+            raise
         except (OSError, av.error.FFmpegError) as error:
             frames, broken = _held(stream, last), reason(error)
         for frame in frames:

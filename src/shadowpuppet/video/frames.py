@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -11,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import FILE_MEMORY, VideoError
+from shadowpuppet.errors import FILE_MEMORY, VideoError, is_out_of_memory, reason
 
 Image = NDArray[np.uint8]
 """A picture, of shape (H, W, 3), blue green red, or (H, W) grey, 0..255."""
@@ -28,6 +29,17 @@ ROUNDING = 1e-6
 """Rounding error of a time, seconds."""
 ASSUMED_RATE = 30.0
 """Frames/s if neither the source nor the caller states times."""
+
+
+@contextlib.contextmanager
+def within_memory(path: object) -> Iterator[None]:
+    """Context that reads a file. Raises `VideoError` naming it if memory does not suffice."""
+    try:
+        yield
+    except Exception as error:
+        if not is_out_of_memory(error):
+            raise
+        raise VideoError(f"{path}: too large for the memory of this machine ({reason(error)})") from None
 
 
 class Frame(NamedTuple):

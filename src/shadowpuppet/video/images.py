@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import FILE_MEMORY, VideoError, check_regular, choices, reason, warn
-from shadowpuppet.video.frames import ASSUMED_RATE, MOST_PIXELS, Frame, FrameSource, Image, Wanted, check_size, size_of
+from shadowpuppet.errors import FILE_MEMORY, VideoError, check_regular, choices, is_out_of_memory, reason, warn
+from shadowpuppet.video.frames import ASSUMED_RATE, MOST_PIXELS, Frame, FrameSource, Image, Wanted, check_size, size_of, within_memory
 from shadowpuppet.video.picture_header import read_header
 
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
@@ -24,14 +24,18 @@ def read_image(path: str | Path, grey: bool = False) -> Image:
     decoded. Raises `VideoError`. The only place where pictures are decoded."""
     import cv2
 
-    data = _content(Path(path))
-    header, image = read_header(data), None
-    if header is not None and header.most > MOST_PIXELS:
-        raise VideoError(f"{path}: found a picture of {header.width} x {header.height} pixels, which takes the memory of {header.most} "
-                         f"while it is decoded; expected at most {MOST_PIXELS}: scale it")
-    if header is not None:
-        with contextlib.suppress(cv2.error):
-            image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
+    with within_memory(path):
+        data = _content(Path(path))
+        header, image = read_header(data), None
+        if header is not None and header.most > MOST_PIXELS:
+            raise VideoError(f"{path}: found a picture of {header.width} x {header.height} pixels, which takes the memory of "
+                             f"{header.most} while it is decoded; expected at most {MOST_PIXELS}: scale it")
+        try:
+            if header is not None:
+                image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
+        except cv2.error as error:
+            if is_out_of_memory(error):
+                raise
     if image is None:
         raise VideoError(f"{path}: not a picture that can be read (damaged, or none of {choices(IMAGE_SUFFIXES)})")
     return np.asarray(image, np.uint8)

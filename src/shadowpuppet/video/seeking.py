@@ -13,7 +13,7 @@ import numpy as np
 from shadowpuppet.errors import VideoError
 from shadowpuppet.video.container import opened
 from shadowpuppet.video.film import Break, converter, decoded
-from shadowpuppet.video.frames import ASSUMED_RATE, Image, Size
+from shadowpuppet.video.frames import ASSUMED_RATE, Image, Size, within_memory
 from shadowpuppet.video.images import IMAGE_SUFFIXES, in_folder, read_image
 
 if TYPE_CHECKING:
@@ -58,7 +58,8 @@ class Seeker:
         """The frame (H, W, 3), blue green red, at a time, seconds after the first; None if there is none."""
         import cv2
 
-        image, self.shown = self._roll.at(time)
+        with within_memory(self.source):
+            image, self.shown = self._roll.at(time)
         if image is None or image.shape[1::-1] == self.size:
             return image
         how = cv2.INTER_AREA if self.size[0] <= image.shape[1] else cv2.INTER_LINEAR

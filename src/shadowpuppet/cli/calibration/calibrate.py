@@ -14,6 +14,7 @@ from shadowpuppet.cli.flags import OTHER, Switch, flag, output
 from shadowpuppet.cli.tables import pairs, show, table
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import vector_from_rotation
+from shadowpuppet.output import say
 
 if TYPE_CHECKING:
     from shadowpuppet.calibration.boards.board import Board
@@ -51,7 +52,7 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
 
         made = _board(lab, board, square, dictionary)
         sheet = write_board(print_board, made)
-        print(f"written: {print_board}, {made.text}, on {sheet}; print it at 100 %, and measure a square")
+        say(f"written: {print_board}, {made.text}, on {sheet}; print it at 100 %, and measure a square")
         return 0
     if lab is None:
         raise CalibrationError("expected a folder with films of a board; or --print-board board.pdf --board 'charuco 7x5' --square 0.04")
@@ -82,7 +83,7 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
         found = solve(session, known, begin, advance)
         written = write_results(found, to or lab / "calibration.toml", None if no_report else calibration_page)
         listener.stop()
-        show(result_table(found), pairs([("written", "\n".join(map(str, written)))]))
+        show(result_table(found), pairs([("written", [*map(str, written)])]))
         for sentence in found.advice:
             listener.warn(sentence)
     return 1 if found.advice else 0
@@ -101,7 +102,7 @@ def _from_person(recording: Path, height: float | None, masks: bool, to: Path | 
         placed = place_cameras(rig, options, listener, rough_focal)
         written = write_placed(rig, placed, to)
         listener.stop()
-        show(placed_table(placed, rig.cameras), pairs([("written", "\n".join(map(str, written)))]))
+        show(placed_table(placed, rig.cameras), pairs([("written", [*map(str, written)])]))
         for sentence in placed.advice:
             listener.warn(sentence)
     return 1 if placed.advice else 0
@@ -146,7 +147,7 @@ def result_table(found: Calibrated) -> RenderableType:
     columns = ("camera", "lens", "views", "error", "unseen views", "focal length", "at, m", "known to")
     parts: list[RenderableType] = [pairs([("board", found.session.board.text)]), "",
                                    table("", columns, _rows(found), right=(2, 3, 4, 5))]
-    parts += ["", pairs([("notes", "\n".join(found.notes))])] if found.notes else []
+    parts += ["", pairs([("notes", found.notes)])] if found.notes else []
     return Group(*parts)
 
 

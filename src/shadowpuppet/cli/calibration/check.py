@@ -64,7 +64,7 @@ def check_table(check: CalibrationCheck) -> RenderableType:
         ("time", f"by the films' {clock}" if check.by_clock else "cannot tell: nobody moves enough" if check.still else None),
         (clock, _stated(check)),
     ]
-    verdict = "all cameras agree" if check.good else "\n".join(check.doubts)
+    verdict = "all cameras agree" if check.good else check.doubts
     return Group(pairs(rows), "", table("", columns, _agreement_rows(check), right=(1, 3, 4)), "", pairs([("verdict", verdict)]))
 
 
@@ -92,7 +92,7 @@ def fix_table(fix: Fix) -> RenderableType:
     """What `--fix` wrote, with the disagreement before and after."""
     rows = [(name, f"{before:.1f} px" if before is not None else "unknown", f"{after:.1f} px" if after is not None else "unknown")
             for name, before, after in fix.pixels]
-    parts: list[RenderableType] = [pairs([("fix", "\n".join(fix.done) or "nothing is certain enough to be changed")])]
+    parts: list[RenderableType] = [pairs([("fix", fix.done or "nothing is certain enough to be changed")])]
     if fix.done:
         parts += ["", table("", ("camera", "before", "after"), rows)]
     return Group(*parts)

@@ -88,7 +88,7 @@ def calibration_table(look: CalibrationLook) -> RenderableType:
     if any(camera.placed for camera in look.cameras):
         parts += ["", top_view(look), pairs(_legend(look))]
     if look.notes:
-        parts += ["", pairs([("read", "\n".join(look.notes))])]
+        parts += ["", pairs([("read", look.notes)])]
     return Group(*parts)
 
 

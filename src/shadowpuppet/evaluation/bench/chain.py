@@ -116,7 +116,7 @@ def _child(failure: str, variables: Mapping[str, str], *arguments: str) -> str:
 
 if __name__ == "__main__":
     if sys.argv[1] == "track":
-        print(json.dumps(track_long(*sys.argv[2:5])))
+        print(json.dumps(track_long(*sys.argv[2:5])))  # noqa: T201 - for the process that started this one
     else:
         from shadowpuppet.evaluation.bench.mono_cases import MonoFollower
 

@@ -1,9 +1,15 @@
-"""Reads tables with named columns and one row per frame (CSV), and checks their cells."""
+"""Reads and writes tables with named columns (CSV), and checks their cells.
+
+A spreadsheet takes a cell that begins with =, +, -, @, a tab or a line end for a formula, which may run a program. Such cells are
+written with an apostrophe before them, which is taken away when the table is read: the same for every table, so that a name is read as it
+was. Numbers stay as they are.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
+import re
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -20,6 +26,9 @@ from shadowpuppet.io.files.text import read_text
 
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
 """Signs with which other programs separate columns."""
+FORMULA = re.compile(r"'*[=+\-@\t\r\n\uff0b\uff0d\uff1d\uff20]")
+"""Beginning of a cell that a spreadsheet may take for a formula, with the apostrophes before it."""
+NUMBER = re.compile(r"-?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|-?(inf|nan)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +54,7 @@ class Table:
     def texts(self, name: str) -> list[str]:
         """A column's text. Raises `FormatError` if it is missing."""
         place, known = self._place(name), dict[str, str]()
-        return [known.setdefault(cell, cell) for cell in (row[place].strip() for row in self._rows())]
+        return [known.setdefault(cell, cell) for cell in (_read(row[place].strip()) for row in self._rows())]
 
     def times(self) -> Array:
         """The column `time` (T,), seconds. Raises `FormatError` if a time is missing or does not increase."""
@@ -121,7 +130,7 @@ def read_table(path: Path, cut: bool = False) -> Table:
             if len(row) <= 1 and not any(map(str.strip, row)):
                 continue
             if columns is None:
-                columns = tuple(cell.strip() for cell in row)
+                columns = tuple(_read(cell.strip()) for cell in row)
                 _check_columns(path, columns)
             elif len(row) != len(columns):
                 raise FormatError(f"{path}: line {reader.line_num}: found {len(row)} cells, expected {len(columns)} as in the header")
@@ -136,10 +145,16 @@ def read_table(path: Path, cut: bool = False) -> Table:
 
 
 def csv_line(cells: Iterable[str]) -> str:
-    """One line of a CSV table."""
+    """One line of a CSV table, without formulas."""
     out = io.StringIO()
-    csv.writer(out, lineterminator="\n").writerow(cells)
-    return out.getvalue()
+    safe = [f"'{cell}" if FORMULA.match(cell) and not NUMBER.fullmatch(cell) else cell for cell in cells]
+    csv.writer(out, lineterminator="\r\n").writerow(safe)  # with which both line ends in a cell are quoted
+    return f"{out.getvalue()[:-2]}\n"
+
+
+def _read(cell: str) -> str:
+    """The text of a cell as `csv_line` was given it."""
+    return cell[1:] if cell.startswith("'") and FORMULA.match(cell) else cell
 
 
 def cells(values: Iterable[float], decimals: int = 6) -> list[str]:

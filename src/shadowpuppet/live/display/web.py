@@ -117,7 +117,7 @@ class _Handler(PageHandler):
             self.answer(self.server.display.picture(*self.server.display.next(0, 0.0)), "image/jpeg")
         elif path == "/picture.mjpeg":
             self.begin(f"multipart/x-mixed-replace; boundary={BOUNDARY}")
-            self.wfile.write(f"--{BOUNDARY}\r\n".encode())
+            self.send(f"--{BOUNDARY}\r\n".encode())
             self._follow(self._picture)
         elif path == "/events":
             self.begin("text/event-stream")
@@ -145,11 +145,11 @@ class _Handler(PageHandler):
             began = time.monotonic()
             new, view = display.next(number)
             if data := part(new, view):
-                self.wfile.write(data)
+                self.send(data)
             number = new
             time.sleep(max(1 / MAX_RATE - (time.monotonic() - began), 0))
         if part == self._figures:
-            self.wfile.write(b'data: {"over": true}\n\n')
+            self.send(b'data: {"over": true}\n\n')
 
     def _picture(self, number: int, view: View) -> bytes:
         """One part and the boundary after it, at which browsers show the picture."""

@@ -14,7 +14,10 @@ from shadowpuppet.live.stream.json_messages import beginning, framed
 from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, Subject
 from shadowpuppet.network import (
     MAX_CONNECTIONS,
+    MAX_OF_ADDRESS,
     REQUEST_SECONDS,
+    SEND_SECONDS,
+    Connections,
     address_family,
     are_origins_allowed,
     is_loopback,
@@ -49,7 +52,7 @@ class WebSocketOutlet(Outlet):
         self._first_message, self._subject_number = "", 0
         self._frame: StreamFrame | None = None
         self._frame_text, self._frame_number = "", 0
-        self._clients, self.served, self.refused = 0, 0, 0
+        self._clients, self.served, self.refused = Connections(MAX_CONNECTIONS, MAX_OF_ADDRESS), 0, 0
         self._changed, self._over = asyncio.Event(), asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._thread = threading.Thread(target=self._run, name="websocket", daemon=True)
@@ -123,10 +126,14 @@ class WebSocketOutlet(Outlet):
         await server.wait_closed()
 
     async def _follow(self, connection: Any) -> None:
-        """Serve one client until it disconnects or the session ends."""
+        """Serve one client until it disconnects, reads nothing for `SEND_SECONDS`, or the session ends."""
         from websockets.exceptions import ConnectionClosed
 
-        self._clients, self.served = self._clients + 1, self.served + 1
+        address = _address(connection)
+        if not self._clients.enter(address):  # others were faster
+            connection.transport.abort()
+            return
+        self.served += 1
         connected = asyncio.ensure_future(self._read(connection))
         try:
             await self._send_newest(connection, connected)
@@ -134,9 +141,11 @@ class WebSocketOutlet(Outlet):
                 await connection.close(1001, "the session is over")
         except ConnectionClosed:  # in the middle of a frame
             pass
+        except TimeoutError:
+            connection.transport.abort()
         finally:
             connected.cancel()
-            self._clients -= 1
+            self._clients.leave(address)
 
     async def _send_newest(self, connection: Any, connected: asyncio.Future[None]) -> None:
         frame_number, subject_number = 0, 0
@@ -144,11 +153,11 @@ class WebSocketOutlet(Outlet):
             changed = self._changed
             if self._first_message and subject_number != self._subject_number:
                 subject_number = self._subject_number
-                await connection.send(self._first_message)
+                await _send(connection, self._first_message)
             elif self._frame is not None and frame_number != self._frame_number:
                 frame_number = self._frame_number
                 self._frame_text = self._frame_text or framed(self._frame)
-                await connection.send(self._frame_text)
+                await _send(connection, self._frame_text)
             else:
                 waiting = asyncio.ensure_future(changed.wait())
                 await asyncio.wait([waiting, connected], return_when=asyncio.FIRST_COMPLETED)
@@ -161,18 +170,29 @@ class WebSocketOutlet(Outlet):
 
     def _check(self, connection: Any, request: Any) -> Any:
         """None for a request that is accepted; else the response that refuses it."""
-        why = self._refusal(request.headers)
+        why = self._refusal(request.headers, _address(connection))
         if why:
             self.refused += 1
             return connection.respond(HTTPStatus.FORBIDDEN, f"{why}\n")
         return None
 
-    def _refusal(self, headers: Any) -> str:
+    def _refusal(self, headers: Any, address: str) -> str:
         if not is_own_host(headers, self.loopback):
             return "this is served under the machine's own address only"
         if not are_origins_allowed(headers, self.origins):
             return "pages may not listen unless their origin is given: --origin"
-        return "too many listen already" if self._clients >= MAX_CONNECTIONS else ""
+        return "" if self._clients.has_room(address) else "too many listen already"
+
+
+async def _send(connection: Any, text: str) -> None:
+    """Send a message. Raises `TimeoutError` if the client does not make room for the next one within `SEND_SECONDS`."""
+    async with asyncio.timeout(SEND_SECONDS):
+        await connection.send(text)
+
+
+def _address(connection: Any) -> str:
+    """The address of a connection's client."""
+    return (connection.remote_address or ("",))[0]
 
 
 def _listening(host: str, port: int) -> socket.socket:

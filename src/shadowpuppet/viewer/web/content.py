@@ -6,6 +6,7 @@ import base64
 import hashlib
 import html
 import json
+import re
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
@@ -44,10 +45,8 @@ def page_text(scene: Scene, cameras: Sequence[Undistorter], images: Sequence[Seq
     server = "'self'" if images is None else ""
     policy = (f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; img-src data: {server}; "
               f"connect-src {server or NOTHING}; base-uri 'none'; form-action 'none'")  # fmt: skip
-    out = _file("page.html")
-    for name, text in (("POLICY", policy), ("TITLE", html.escape(scene.title)), ("STYLE", style), ("DATA", data), ("SCRIPT", script)):
-        out = out.replace(f"@{name}@", text)
-    return out
+    parts = {"POLICY": policy, "TITLE": html.escape(scene.title), "STYLE": style, "DATA": data, "SCRIPT": script}
+    return re.sub(r"@([A-Z]+)@", lambda found: parts[found[1]], _file("page.html"))  # in one pass: names in the parts may look like places
 
 
 def _file(name: str) -> str:

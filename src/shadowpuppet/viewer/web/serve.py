@@ -13,7 +13,7 @@ import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.geometry import Array
-from shadowpuppet.network import is_loopback, is_same_origin, open_page, page_headers, shown_host
+from shadowpuppet.network import is_loopback, open_page, page_headers, shown_host
 from shadowpuppet.page_server import PageHandler, PageServer
 from shadowpuppet.viewer.scene.scene import Scene
 from shadowpuppet.viewer.web.content import page_text
@@ -110,9 +110,6 @@ class _Handler(PageHandler):
     def do_GET(self) -> None:
         """Answer with the page, an image, or numbers."""
         if not self.is_accepted():
-            return
-        if not is_same_origin(self.headers):
-            self.refuse(HTTPStatus.FORBIDDEN, "this page is served to itself only")
             return
         try:
             found = self.server.page.part(self.path)
