@@ -27,13 +27,13 @@ from typing import Any
 import numpy as np
 import smallest
 from multiview import BUILD, made, measures
+from speed.chain import ONE_THREAD_EACH
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import Sizes
 from shadowpuppet.camera.colour_codes import colour_codes
-from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable

@@ -11,6 +11,7 @@ from typing import Literal
 from cyclopts import App, CycloptsError, UnusedCliTokensError
 
 from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, one_line
+from shadowpuppet.removed import refuse_tokens
 
 COMMANDS = {
     "track": "track:track", "live": "track:live", "play": "track:play", "demo": "track:demo", "fit-person": "track:fit_person",
@@ -18,7 +19,7 @@ COMMANDS = {
     "masks": "recordings:masks",
     "calibrate": "calibration.calibrate:calibrate",
     "check": "calibration.check:check", "fit-prior": "motion:fit_prior", "export": "motion:export", "convert": "motion:convert",
-    "evaluate": "evaluation:evaluate", "bench": "bench:bench", "batch": "batch:batch", "view": "viewer:view",
+    "evaluate": "evaluation:evaluate", "batch": "batch:batch", "view": "viewer:view",
     "settings": "app:settings", "completion": "app:completion", "doctor": "doctor:doctor",
 }  # fmt: skip
 """Module in this package and function of each command, by the command's name; loaded when used."""
@@ -73,6 +74,7 @@ def run(tokens: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code: 0, 2 for a user's mistake, 130 after Ctrl-C; 1 and 3 come from commands."""
     tokens = sys.argv[1:] if tokens is None else tokens
     try:
+        refuse_tokens(tokens)
         if not tokens or tokens[0] in app.help_flags:
             app.resolved_commands()  # the list of commands shows the first line of each one's help
         code = app(list(tokens), exit_on_error=False, print_error=False, result_action="return_value")

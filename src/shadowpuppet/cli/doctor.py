@@ -37,6 +37,8 @@ CODECS = {"H.264": "h264", "HEVC": "hevc", "VP9": "vp9", "AV1": "av1", "MPEG-4":
 """Common codecs, and FFmpeg's names of their decoders."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "safari", "microsoft-edge", "xdg-open", "open")
 MARKS = {"works": ("yes", "green"), "missing": ("no", "yellow"), "broken": ("broken", "red")}
+PACKAGES = ("shadowpuppet", "numpy", "numba", "llvmlite", "opencv-python-headless", "av")
+LEVELS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX"), ("neon", "NEON"))
 REPAIR = "python -m pip install --force-reinstall shadowpuppet"
 
 
@@ -238,8 +240,25 @@ def _has_codec(av: object, name: str) -> bool:
     return True
 
 
+def environment() -> dict[str, Any]:
+    """Processor, cores, vector instructions, system and versions."""
+    import llvmlite.binding as llvm
+
+    features = llvm.get_host_cpu_features()
+    level = next((name for feature, name in LEVELS if features.get(feature)), "none known")
+    return {"cpu": _model(), "llvm_cpu": llvm.get_host_cpu_name(), "cores": os.cpu_count(), "vectors": level, "system": platform.platform(),
+            "python": platform.python_version(), **{name: metadata.version(name) for name in PACKAGES}}
+
+
+def _model() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
 def _processor() -> Iterator[Finding]:
-    from shadowpuppet.evaluation.bench.machine import environment
     from shadowpuppet.threads import THREADS_VARIABLE, thread_limit, usable_cores
 
     known = environment()
