@@ -109,7 +109,7 @@ class Case:
         self.survey = survey_rig(self.rig, make_options({"masks": masks}))
         truth = read_joints(self.rig.recording.truth)  # pyright: ignore[reportArgumentType]
         self.times, self.store = list[float](), MaskStore(limit=10**12)
-        for seen in read_frames(self.rig, [each.following() for each in self.survey.silhouettes], ready=masks):
+        for seen in read_frames(self.rig, [each.segmented for each in self.survey.silhouettes], ready=masks):
             self.times.append(seen.time)
             self.store.add(seen.time, seen.masks, codes=tuple(map(colour_codes, seen.corrected)))
             if len(self.times) == frames:

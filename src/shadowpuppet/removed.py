@@ -14,9 +14,13 @@ COMMANDS = {
     "bench": "bench has moved: python -m benchmarks.bench in the source repository",
 }
 """By the command's name."""
-SETTINGS: dict[str, str] = {}
-"""By the setting's name with dots, or by name and value: `silhouette.method = knn`."""
-IDLE: dict[str, object] = {}
+SETTINGS = {
+    "silhouette.maintain": "the background no longer follows lasting changes: leave them out with --region, or take masks of another "
+                           "program (shadowpuppet masks)",
+    "silhouette.method = knn": "found knn, which is gone; mog2 does the same as well, and auto better",
+}
+"""By the setting's name with dots, or by its name and a value."""
+IDLE: dict[str, object] = {"silhouette.maintain": False}
 """By the name of a removed setting: the value that changed nothing. Files of earlier versions hold it, and it is left out."""
 
 
@@ -31,14 +35,19 @@ def refuse_tokens(tokens: Sequence[str]) -> None:
 
 
 def without_removed(values: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Settings of a file, tables in tables, without removed ones that changed nothing. Raises `SettingsError` for others."""
+    """Settings, tables in tables, without removed ones that changed nothing. Raises `SettingsError` for others; `source` names the file."""
     return dict(_kept(values, "", source))
 
 
-def _kept(values: Mapping[str, Any], table: str, source: str) -> Iterator[tuple[str, Any]]:
+def of_earlier_run(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings of a finished run without all that is removed: the run is shown and measured, not repeated."""
+    return dict(_kept(values, "", None))
+
+
+def _kept(values: Mapping[str, Any], table: str, source: str | None) -> Iterator[tuple[str, Any]]:
     for key, value in values.items():
         name = f"{table}{key}"
-        if name in IDLE and value == IDLE[name]:
+        if (name in IDLE and value == IDLE[name]) or (source is None and _replacement(name, value) is not None):
             continue
         refuse_setting(name, value, f"{source}: {name}")
         yield key, dict(_kept(value, f"{name}.", source)) if isinstance(value, Mapping) else value
@@ -46,5 +55,9 @@ def _kept(values: Mapping[str, Any], table: str, source: str) -> Iterator[tuple[
 
 def refuse_setting(name: str, value: object, place: str) -> None:
     """Raise `SettingsError` for a removed setting or value; `place` is where it stands."""
-    if (replacement := SETTINGS.get(f"{name} = {value}", SETTINGS.get(name))) is not None:
+    if (replacement := _replacement(name, value)) is not None:
         raise SettingsError(f"{place}: {replacement}")
+
+
+def _replacement(name: str, value: object) -> str | None:
+    return SETTINGS.get(f"{name} = {value}", SETTINGS.get(name))
