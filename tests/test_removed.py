@@ -8,7 +8,8 @@ import pytest
 import runs
 import tomli_w
 
-from shadowpuppet.errors import SettingsError
+from shadowpuppet.errors import CalibrationError, SettingsError
+from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.pipeline.options import make_options, read_options
 from shadowpuppet.removed import COMMANDS, SETTINGS, of_earlier_run
 
@@ -56,9 +57,20 @@ def test_what_is_not_removed_is_kept():
 def test_a_run_of_an_earlier_version_is_shown_measured_and_exported(shell, recording, tmp_path, table):
     folder = runs.make_run(tmp_path / "run", "rounded", frames=8)
     info = tomllib.loads((folder / "run.toml").read_text("utf-8"))
-    (folder / "run.toml").write_text(tomli_w.dumps(info | {"recording": str(recording), "settings": {"seed": 3, "silhouette": table}}), encoding="utf-8")
+    info |= {"recording": str(recording), "settings": {"seed": 3, "silhouette": table}}
+    (folder / "run.toml").write_text(tomli_w.dumps(info), encoding="utf-8")
     truth = folder / "joints.csv"
     for tokens in (("view", folder, "--html", tmp_path / "page.html"), ("evaluate", folder, truth, "--report", tmp_path / "report.html"),
                    ("export", folder, "--to", "bvh")):
         code, _, err = shell(*tokens)
         assert code == 0, err
+
+
+@pytest.mark.parametrize("name", ["C1.cal", "Calib_Results.m", "Calib_Results.mat", "lab/C1.cal"])
+def test_a_calibration_of_bouguets_toolbox_names_its_replacement(tmp_path, name):
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("1 2 3")
+    path = path.parent if name.startswith("lab") else path
+    with pytest.raises(CalibrationError, match=r"Bouguet's toolbox, which is not read any more.* papers\.humaneva"):
+        read_calibration(path)

@@ -12,6 +12,7 @@ from shadowpuppet.errors import SettingsError, ShadowPuppetError
 
 COMMANDS = {
     "bench": "bench has moved: python -m benchmarks.bench in the source repository",
+    "humaneva": "humaneva has moved: python -m papers.humaneva in the source repository",
 }
 """By the command's name."""
 SETTINGS = {
@@ -20,6 +21,10 @@ SETTINGS = {
     "silhouette.method = knn": "found knn, which is gone; mog2 does the same as well, and auto better",
 }
 """By the setting's name with dots, or by its name and a value."""
+BOUGUET = ("found a calibration of Bouguet's toolbox, which is not read any more, expected calibration.toml or OpenCV's YAML; a trial of "
+           "HumanEva becomes a recording by python -m papers.humaneva in the source repository")
+FILES = dict.fromkeys((".cal", ".m", ".mat"), BOUGUET)
+"""By the ending of a calibration file."""
 IDLE: dict[str, object] = {"silhouette.maintain": False}
 """By the name of a removed setting: the value that changed nothing. Files of earlier versions hold it, and it is left out."""
 

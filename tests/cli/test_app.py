@@ -169,7 +169,7 @@ def test_track_tells_what_it_found_and_what_came_out(shell, recording, tmp_path)
     assert (tmp_path / "run-tiny" / "joints.csv").exists()
 
 
-@pytest.mark.parametrize("name", ["track", "live", "demo", "fit-person", "synthesize", "evaluate", "fit-prior", "humaneva",
+@pytest.mark.parametrize("name", ["track", "live", "demo", "fit-person", "synthesize", "evaluate", "fit-prior",
                                   "export", "convert", "batch", "play"])
 def test_every_command_that_takes_its_time_can_be_quiet(name, shell):
     assert "--quiet" in shell(name, "--help")[1]

@@ -15,7 +15,7 @@ from shadowpuppet.removed import refuse_tokens
 
 COMMANDS = {
     "track": "track:track", "live": "track:live", "play": "track:play", "demo": "track:demo", "fit-person": "track:fit_person",
-    "info": "recordings:info", "synthesize": "recordings:synthesize", "humaneva": "recordings:humaneva",
+    "info": "recordings:info", "synthesize": "recordings:synthesize",
     "masks": "recordings:masks",
     "calibrate": "calibration.calibrate:calibrate",
     "check": "calibration.check:check", "fit-prior": "motion:fit_prior", "export": "motion:export", "convert": "motion:convert",
