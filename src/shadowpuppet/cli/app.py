@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from typing import Literal
 
-from cyclopts import App, CycloptsError, UnusedCliTokensError
+from cyclopts import App, CycloptsError, Group, UnusedCliTokensError
 
 from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, one_line
 from shadowpuppet.removed import refuse_tokens
@@ -24,6 +24,10 @@ COMMANDS = {
 }  # fmt: skip
 """Module in this package and function of each command, by the command's name; loaded when used."""
 
+FIRST = ("track", "live", "info", "calibrate", "check", "masks", "view", "evaluate", "export", "synthesize", "demo")
+"""Commands that `--help` lists first; the others are under "More"."""
+_GROUPS = tuple(Group(name, sort_key=n) for n, name in enumerate(("Commands", "More")))
+
 
 def _version() -> str:
     from importlib.metadata import version
@@ -32,9 +36,9 @@ def _version() -> str:
 
 
 app = App(name="shadowpuppet", version=_version, help_format="plaintext", suppress_keyboard_interrupt=False,
-          help="Markerless motion capture from silhouettes.")
+          group_commands=_GROUPS[0], help="Markerless motion capture from silhouettes.")
 for _name, _place in COMMANDS.items():
-    app.command(f"shadowpuppet.cli.{_place}", name=_name)
+    app.command(f"shadowpuppet.cli.{_place}", name=_name, group=_GROUPS[_name not in FIRST])
 
 
 def settings(*, preset: str = "default") -> None:

@@ -143,36 +143,9 @@ def _libraries() -> Iterator[Finding]:
         yield Finding("libraries", "works", ", ".join(info), needed=True)
 
 
-def _weight() -> Iterator[Finding]:
-    """What the package and all that it needs weigh on disk, as installed, without extras and caches."""
-    sizes = sorted(((_size(name), name) for name in _needed("shadowpuppet")), reverse=True)
-    heaviest = ", ".join(f"{name} {size / 1e6:.0f}" for size, name in sizes[:6])
-    yield Finding("weight", "works", f"{sum(size for size, _ in sizes) / 1e6:.0f} MB: {heaviest}, {max(len(sizes) - 6, 0)} others")
-
-
-def _needed(name: str) -> set[str]:
-    """A distribution and, by their own statements, those that it needs, as far as they are installed; without extras."""
-    found, open_ends = set[str](), [name]
-    while open_ends:
-        name = re.sub(r"[-_.]+", "-", open_ends.pop()).lower()
-        try:
-            wanted = _required(name)
-        except metadata.PackageNotFoundError:  # of another system or Python
-            continue
-        if name not in found:
-            found.add(name)
-            open_ends += wanted
-    return found
-
-
 def _required(name: str) -> list[str]:
     """The distributions that one states to need, without extras. Raises `PackageNotFoundError`."""
     return [re.split(r"[^\w.-]", text, maxsplit=1)[0] for text in metadata.requires(name) or [] if "extra ==" not in text]
-
-
-def _size(name: str) -> int:
-    """Bytes of a distribution's files, as its installer recorded them."""
-    return sum(file.size or 0 for file in metadata.files(name) or [])
 
 
 def _kernels() -> Iterator[Finding]:
@@ -336,7 +309,7 @@ def _writable(folder: Path) -> bool:
 
 
 CHECKS: tuple[tuple[str, Callable[[], Iterator[Finding]], bool], ...] = (
-    ("Python", _python, True), ("libraries", _libraries, True), ("weight", _weight, False),
+    ("Python", _python, True), ("libraries", _libraries, True),
     ("kernels", _kernels, True), ("compiled code", _cache, False),
     ("films", _films, True), ("codecs", _codecs, False), ("processor", _processor, False), ("extras", _extras, False),
     ("masks", _external_masks, False), ("browser", _browser, False), ("cameras", _cameras, False),
