@@ -202,7 +202,7 @@ def track_multiview(path: Path) -> Iterator[Tracked]:
     survey = survey_rig(open_rig(path, options), options)
     subject = fit_multiview(np.random.default_rng(0), survey, options)
     truth, rate = read_joints(path / "truth.csv"), survey.rig.rate
-    frames = [(each.time, each.seen.masks) for each in read_frames(survey.rig, [each.following() for each in survey.silhouettes])]
+    frames = [(each.time, each.seen.masks) for each in read_frames(survey.rig, [each.segmented for each in survey.silhouettes])]
     empty = [np.zeros(camera.size[::-1], bool) for camera in subject.hull.cameras]
     films = [[none if (mask := masks[n]) is None else mask for _, masks in frames] for n, none in enumerate(empty)]
     times, body, names = [time for time, _ in frames], subject.body, subject.body.landmark_names

@@ -27,9 +27,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import smallest
 from fault_rows import CLEAN, ONE, SEVERAL, Row, films_of_one, films_of_several, tiny
+from speed.chain import ONE_THREAD_EACH
 
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
-from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.people import person_folder

@@ -23,7 +23,6 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.io.calibration.calibration_files import examine_calibration, write_calibration
 from shadowpuppet.io.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from shadowpuppet.io.export import export_run
-from shadowpuppet.io.humaneva import read_sync
 from shadowpuppet.io.intervals import read_intervals
 from shadowpuppet.io.motion.amc import read_mocap
 from shadowpuppet.io.motion.joint_names import read_names
@@ -61,7 +60,6 @@ READERS: dict[str, Callable[[Path], object]] = {
     "truth": read_truth,
     "skeleton": lambda path: read_mocap(path.parent / "01_01.amc"),
     "mot": read_mot,
-    "sync": read_sync,
     "options": lambda path: make_options(read_options(path), str(path)),
     "grid": read_grid,
     "spec": read_spec,
@@ -119,7 +117,6 @@ def write(folder: Path) -> None:
     for path in (folder / "motion").iterdir():
         (folder / "look" / path.name).write_bytes(path.read_bytes())
     (folder / "names" / "names.toml").write_text('left_hip = "bone 1"\nleft_knee = "bone 2"\n"head" = "skull"\n')
-    (folder / "sync" / "a.ofs").write_text("82\n61\n2.001\n5 6 7\n")
     (folder / "options" / "all.toml").write_text(options_text(make_options({})))
     (folder / "options" / "some.toml").write_text('preset = "liu2011"\nheight = 1.8\n[tracker.arm]\nparticles = 30\n')
     (folder / "grid" / "grid.toml").write_text(GRID)

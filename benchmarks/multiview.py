@@ -30,8 +30,8 @@ from typing import Any
 
 import numpy as np
 import smallest
+from speed.chain import ONE_THREAD_EACH
 
-from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import Recording, read_recording

@@ -27,13 +27,13 @@ from typing import Any
 import numpy as np
 import smallest
 from multiview import BUILD, made, measures
+from speed.chain import ONE_THREAD_EACH
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import Sizes
 from shadowpuppet.camera.colour_codes import colour_codes
-from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
@@ -109,7 +109,7 @@ class Case:
         self.survey = survey_rig(self.rig, make_options({"masks": masks}))
         truth = read_joints(self.rig.recording.truth)  # pyright: ignore[reportArgumentType]
         self.times, self.store = list[float](), MaskStore(limit=10**12)
-        for seen in read_frames(self.rig, [each.following() for each in self.survey.silhouettes], ready=masks):
+        for seen in read_frames(self.rig, [each.segmented for each in self.survey.silhouettes], ready=masks):
             self.times.append(seen.time)
             self.store.add(seen.time, seen.masks, codes=tuple(map(colour_codes, seen.corrected)))
             if len(self.times) == frames:

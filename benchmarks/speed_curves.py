@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 import smallest
+from speed.mono_cases import MonoCase
+from speed.multi_cases import MultiCase
+from speed.timing import Contender, in_turns
 
 from shadowpuppet.camera.bits import pack
-from shadowpuppet.evaluation.bench.mono_cases import MonoCase
-from shadowpuppet.evaluation.bench.multi_cases import MultiCase
-from shadowpuppet.evaluation.bench.timing import Contender, in_turns
 from shadowpuppet.geometry import Array
 from shadowpuppet.threads import one_blas_thread, one_opencv_thread
 

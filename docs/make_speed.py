@@ -8,8 +8,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.cli.bench import MONO_ROWS, MULTI_ROWS
-from shadowpuppet.evaluation.bench.run import run_bench
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.bench import MONO_ROWS, MULTI_ROWS, run_bench
 
 PAGE = Path(__file__).parent / "speed.md"
 PLACE = re.compile(r"(<!-- figures -->\n).*?(<!-- end of figures -->)", re.DOTALL)

@@ -16,7 +16,6 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.person import read_person
@@ -30,6 +29,10 @@ from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
 from shadowpuppet.tracking.multiview.settings import ForceSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.video import open_frames, write_image
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.speed import naive_multi as naive
 
 ASSETS = Path(__file__).parent / "assets"
 FRAME, TIMES = 34, (0.3, 0.55)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numba
 import pytest
@@ -12,8 +13,9 @@ from numba.core import caching
 
 from shadowpuppet.jit import compiled
 
+ROOT = Path(__file__).resolve().parents[1]
 FIRST_RUN = """
-from shadowpuppet.evaluation.bench.multi_cases import MultiCase
+from benchmarks.speed.multi_cases import MultiCase
 around = MultiCase(cameras=3, points=300, particles=4, size=(160, 120))
 print(around.run_forces(3).tobytes().hex(), around.run_gauss_newton(2).tobytes().hex())
 """
@@ -22,8 +24,8 @@ print(around.run_forces(3).tobytes().hex(), around.run_gauss_newton(2).tobytes()
 def test_what_is_compiled_now_and_what_is_loaded_from_the_cache_agree_to_the_last_bit(tmp_path):
     """Numba optimises the two apart: sums that may be taken in any order come out different."""
     surroundings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
-    first, second = (subprocess.run([sys.executable, "-c", FIRST_RUN], env=surroundings, capture_output=True, text=True, check=True).stdout
-                     for _ in range(2))
+    first, second = (subprocess.run([sys.executable, "-c", FIRST_RUN], cwd=ROOT, env=surroundings, capture_output=True, text=True,
+                                    check=True).stdout for _ in range(2))
     assert list(tmp_path.rglob("*.nbc"))
     assert len(first) > 1000
     assert first == second

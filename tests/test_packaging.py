@@ -41,7 +41,7 @@ def test_importing_the_package_loads_nothing_heavy():
 
 def test_help_and_reading_files_load_no_compiler_codec_or_plots():
     for code in ("from shadowpuppet.cli.app import app; app.help_print",
-                 "from shadowpuppet import read_run, read_recording, read_joints, read_motion, read_prior, read_humaneva"):
+                 "from shadowpuppet import read_run, read_recording, read_joints, read_motion, read_prior"):
         assert not loaded_after(code) & {"numba", "cv2", "av", "matplotlib"}
 
 

@@ -36,9 +36,9 @@ import fault_rows  # noqa: E402
 import faults  # noqa: E402
 import multiview  # noqa: E402
 import smallest  # noqa: E402
+from speed.chain import ONE_THREAD_EACH  # noqa: E402
 from triangulation import LANDMARKS, SEEN, one_camera, several_cameras  # noqa: E402
 
-from shadowpuppet.evaluation.bench.chain import ONE_THREAD_EACH  # noqa: E402
 from shadowpuppet.geometry import Array, align  # noqa: E402
 from shadowpuppet.io.files.npz import read_members  # noqa: E402
 from shadowpuppet.io.motion.motion_files import read_truth  # noqa: E402

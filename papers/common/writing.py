@@ -11,7 +11,7 @@ from typing import Any
 from papers.common.claims import HEADER
 from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.plotting import save_picture
-from shadowpuppet.evaluation.bench.machine import environment
+from shadowpuppet.cli.doctor import environment
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.pipeline.progress import json_text
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.speed.mono_cases import MonoCase as Drawn
+from benchmarks.speed.opencv import OpenCV
+from benchmarks.speed.timing import Contender, in_turns
 from papers.common.claims import Verdict, difference
 from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.plotting import COLOURS, label, new_figure
@@ -11,9 +14,6 @@ from papers.liu2011.material import case, made_recording
 from papers.liu2011.repeats import repeat
 from papers.liu2011.shown import told
 from papers.liu2011.sweeps import Measured, measured
-from shadowpuppet.evaluation.bench.mono_cases import MonoCase as Drawn
-from shadowpuppet.evaluation.bench.opencv import OpenCV
-from shadowpuppet.evaluation.bench.timing import Contender, in_turns
 from shadowpuppet.threads import one_blas_thread, one_opencv_thread
 
 BODIES = {"cardbox": "cardbox", "boxes": "volumetric (boxes)"}

@@ -7,13 +7,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from benchmarks.speed.timing import Contender
 from papers.common.claims import Verdict
 from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.plotting import COLOURS, label, new_figure
 from papers.liu2011.material import Case, cases
 from papers.liu2011.repeats import with_method
 from papers.liu2011.shown import stem, told
-from shadowpuppet.evaluation.bench.timing import Contender
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.threads import one_blas_thread, one_opencv_thread
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker

@@ -187,7 +187,7 @@ def _complete(folder: Path, spec: Spec) -> bool:
 
 def _of_humaneva(request: Request, data: Path, action: str) -> Source:
     """A trial of HumanEva as a recording folder in the request's."""
-    from shadowpuppet.io.humaneva import read_humaneva, write_humaneva
+    from papers.humaneva.trials import read_humaneva, write_humaneva
 
     found = read_humaneva(data, request.more.get("subject") or "S2", action)
     folder = request.output / "humaneva" / found.recording.name

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from benchmarks.speed import naive_multi as plain
 from papers.common.experiment import Outcome, Request, Table
 from papers.common.plotting import COLOURS, new_figure
 from papers.ni2008.inputs import BODY
@@ -12,7 +13,6 @@ from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body, Limbs
 from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.evaluation.bench import naive_multi as plain
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic import Viewpoint
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings

@@ -57,7 +57,7 @@ def read(source: Source) -> tuple[tuple[Camera, ...], dict[str, NDArray[Any]]]:
     survey = survey_rig(rig, options)
     if survey.look.refusal is not None:
         raise TrackingError(f"{survey.look.recording}: {survey.look.refusal}")
-    sets = read_frames(rig, [each.following() for each in survey.silhouettes], ready=source.masks)
+    sets = read_frames(rig, [each.segmented for each in survey.silhouettes], ready=source.masks)
     seen = (Seen(each.time, list(each.seen.masks)) for each in sets)
     return rig.cameras, _arrays(rig.cameras, rig.rate, seen, read_joints(recording.truth), read_motion(recording.training), OPENED)
 

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from shadowpuppet.evaluation.report.page import write_report
     from shadowpuppet.io.calibration.calibration_files import read_calibration, write_calibration
     from shadowpuppet.io.export import convert_motion, export_run
-    from shadowpuppet.io.humaneva import read_humaneva
     from shadowpuppet.io.motion.motion_files import read_motion, read_truth
     from shadowpuppet.io.motion.table import read_joints, write_joints
     from shadowpuppet.io.person import Person, read_person, write_person
@@ -64,7 +63,7 @@ _HOMES = {
     "HullSettings": "tracking.multiview.settings", "SurfacePoints": "tracking.multiview.surface.visual_hull",
     "VisualHull": "tracking.multiview.surface.visual_hull", "FittedPoses": "motion.inverse_kinematics",
     "fit_poses": "motion.inverse_kinematics", "AnatomicalSizes": "body.sizes", "CylinderSizes": "body.sizes",
-    "read_humaneva": "io.humaneva", "read_motion": "io.motion.motion_files", "MultiviewTracker": "tracking.multiview.tracker",
+    "read_motion": "io.motion.motion_files", "MultiviewTracker": "tracking.multiview.tracker",
     "MultiviewSettings": "tracking.multiview.settings", "make_multiview_settings": "tracking.multiview.settings",
     "export_run": "io.export", "convert_motion": "io.export", "Comparison": "evaluation.evaluation",
     "Evaluation": "evaluation.evaluation", "measure_run": "evaluation.evaluation", "read_truth": "io.motion.motion_files",
@@ -80,7 +79,7 @@ __all__ = [  # noqa: RUF022 - loaded by __getattr__
     "write_calibration", "write_frames", "write_joints", "write_person",
     "MotionPrior", "PriorSettings", "choose_regions", "fit_prior", "read_prior", "write_prior", "HullSettings", "SurfacePoints",
     "VisualHull", "FittedPoses", "fit_poses", "AnatomicalSizes", "CylinderSizes",
-    "read_humaneva", "read_motion", "MultiviewTracker", "MultiviewSettings", "make_multiview_settings", "export_run",
+    "read_motion", "MultiviewTracker", "MultiviewSettings", "make_multiview_settings", "export_run",
     "convert_motion", "Comparison", "Evaluation", "measure_run", "read_truth", "write_report",
     "open_footage", "read_masks",
 ]  # fmt: skip

@@ -11,10 +11,10 @@ from scans import make_body as random_tree
 from scans import some_pose
 from scipy.spatial.transform import Rotation
 
+from benchmarks.speed import naive_multi as naive
 from shadowpuppet.body.forward_kinematics import ROTATION, TRANSLATION, VECTOR
 from shadowpuppet.body.jacobian import SMALL_ANGLE, exponential, make_chain, place_one
 from shadowpuppet.body.models import WHOLE, average_sizes, make_body
-from shadowpuppet.evaluation.bench import naive_multi as naive
 
 pytestmark = pytest.mark.kernels
 BODIES = {"tree": random_tree(), **{name: make_body(name, average_sizes(name, 1.75)) for name in WHOLE}}

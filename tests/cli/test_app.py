@@ -118,6 +118,13 @@ def test_progress_goes_on_while_the_compiler_is_being_imported(monkeypatch):
     assert terminal_module._compiling() == ""
 
 
+def test_help_lists_what_most_need_first(shell):
+    _, out, _ = shell("--help")
+    first, more = (set(re.findall(r"^[│ ]*([a-z]+(?:-[a-z]+)*)  ", part, re.MULTILINE)) for part in out.split("More", 1))
+    assert set(cli.FIRST) <= first
+    assert set(cli.COMMANDS) - set(cli.FIRST) <= more
+
+
 def test_the_version_is_reported_by_the_module_too():
     child = process("--version")
     out, err = child.communicate()
@@ -169,7 +176,7 @@ def test_track_tells_what_it_found_and_what_came_out(shell, recording, tmp_path)
     assert (tmp_path / "run-tiny" / "joints.csv").exists()
 
 
-@pytest.mark.parametrize("name", ["track", "live", "demo", "fit-person", "synthesize", "bench", "evaluate", "fit-prior", "humaneva",
+@pytest.mark.parametrize("name", ["track", "live", "demo", "fit-person", "synthesize", "evaluate", "fit-prior",
                                   "export", "convert", "batch", "play"])
 def test_every_command_that_takes_its_time_can_be_quiet(name, shell):
     assert "--quiet" in shell(name, "--help")[1]

@@ -86,21 +86,6 @@ def test_a_library_that_cannot_be_loaded_breaks_the_core(name, told, monkeypatch
     assert f"import of {name} halted" in " ".join(out.split())
 
 
-def test_weight_counts_what_is_needed_by_what_is_needed(monkeypatch):
-    needs = {"shadowpuppet": ["a>=1", "b; extra == 'view'"], "a": ["C.d"], "c-d": ["a", "absent"], "b": []}
-
-    def requires(name):
-        if name not in needs:
-            raise doctor.metadata.PackageNotFoundError
-        return needs[name]
-
-    monkeypatch.setattr(doctor.metadata, "requires", requires)
-    sizes = {"shadowpuppet": 2_000_000, "a": 30_000_000, "c-d": 500_000_000}
-    monkeypatch.setattr(doctor, "_size", sizes.__getitem__)
-    (weight,) = doctor._weight()
-    assert weight.told == "532 MB: c-d 500, a 30, shadowpuppet 2, 0 others"
-
-
 def test_films_that_cannot_be_written_break_the_core(monkeypatch):
     def fail(*_, **__):
         raise OSError("no encoder\nfor H.264")

@@ -149,8 +149,8 @@ def test_humaneva_is_asked_for_the_papers_trials(tmp_path, monkeypatch):
         asked.append((folder, subject, action))
         return SimpleNamespace(recording=SimpleNamespace(name=f"{subject}_{action}_1"))
 
-    monkeypatch.setattr("shadowpuppet.io.humaneva.read_humaneva", read)
-    monkeypatch.setattr("shadowpuppet.io.humaneva.write_humaneva", lambda found, folder: folder.mkdir(parents=True))
+    monkeypatch.setattr("papers.humaneva.trials.read_humaneva", read)
+    monkeypatch.setattr("papers.humaneva.trials.write_humaneva", lambda found, folder: folder.mkdir(parents=True))
     found = inputs.sources(Request(tmp_path, more={"humaneva": tmp_path / "data", "subject": "S2"}))
     assert asked == [(tmp_path / "data", "S2", action) for action in ("Walking", "Jog", "Box")]
     assert [inputs.motion_of(source.name) for source in found] == ["walking", "jogging", "boxing"]

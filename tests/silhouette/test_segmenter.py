@@ -85,7 +85,7 @@ def test_nobody_and_everything_are_no_errors(rng):
     assert segmenter(np.zeros((*SIZE, 3), np.uint8)).mean() > 0.95
 
 
-@pytest.mark.parametrize("method", ["brightness", "colour", "both", "mog2", "knn"])
+@pytest.mark.parametrize("method", ["brightness", "colour", "both", "mog2"])
 def test_shadow_is_background_and_dark_clothes_are_not(rng, method):
     wall, mask = scene(rng, (190, 140, 90)), figure()
     picture = dressed(wall, mask, shirt=(25, 25, 25))
@@ -196,24 +196,6 @@ def test_a_trembling_camera_makes_no_silhouette_of_edges(rng):
     segmenter = learn_background(empty_shots(rng, wall))
     shifted = cv2.warpAffine(wall, np.array([[1, 0, 0.12], [0, 1, 0]]), SIZE[::-1], borderMode=cv2.BORDER_REPLICATE)
     assert not (segmenter.classifier(shot(rng, shifted)) == 2).any()
-
-
-def test_one_neighbour_is_not_enough(rng):
-    wall = scene(rng)
-    images = empty_shots(rng, wall, 7)
-    images[3][50:80, 50:80] = 20  # somebody was in the way once
-    image = shot(rng, wall)
-    image[50:80, 50:80] = 20
-    segmenter = learn_background(images, SilhouetteSettings(method="knn", shadow=False))
-    assert segmenter(image)[52:78, 52:78].all()
-
-
-def test_neighbours_of_a_single_background_picture(rng):
-    """A single sample can be near only once: two must not be asked for, or all is foreground."""
-    wall, mask = scene(rng), figure()
-    segmenter = learn_background([shot(rng, wall)], SilhouetteSettings(method="knn", shadow=False))
-    assert not segmenter(shot(rng, wall)).any()
-    assert overlap(segmenter(shot(rng, dressed(wall, mask))), mask) > 0.9
 
 
 # ---------------------------------------------------------------- the key

@@ -146,13 +146,6 @@ def vicon(made: Sequence[Camera], k: Sequence[float] = VICON_K, radial: int = 2)
     return f'<?xml version="1.0" encoding="UTF-8" standalone="no" ?>\n<Cameras NAME="" VERSION="1.0">\n{body}</Cameras>\n'
 
 
-def cal(camera: Camera) -> str:
-    """HumanEva's: fc cc alpha kc R T."""
-    T = camera.T_camera_world
-    lines = [np.diag(camera.matrix)[:2], camera.matrix[:2, 2], [0.0], camera.distortion[:5], *T[:3, :3], T[:3, 3] * 1000]
-    return "\n".join(" ".join(f"{value:.12g}" for value in line) for line in lines) + "\n"
-
-
 def panoptic(made: Sequence[Camera]) -> str:
     """JSON as written by CMU Panoptic: centimetres."""
     return json.dumps({"calibDataSource": "x", "cameras": [
@@ -214,11 +207,11 @@ def write_all(folder: Path, made: Sequence[Camera]) -> dict[str, Path]:
              "Calib.qca.txt": qualisys(made), "KRT": krt(made), "camchain.yaml": kalibr(made),
              "session.xcp": vicon(made), "easy/intri.yml": intri(made), "easy/extri.yml": extri(made)}
     for camera in made:
-        texts |= {f"cal/{camera.name}.cal": cal(camera), f"yaml/{camera.name}.yml": opencv(camera)}
+        texts |= {f"yaml/{camera.name}.yml": opencv(camera)}
         texts |= {f"xml/{camera.name}.xml": opencv_xml(camera), f"biocv/{camera.name}.mp4.calib": biocv(camera)}
     for name, text in texts.items():
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text)
     (folder / "cameraIntrinsicsExtrinsics.pickle").write_bytes(pickle.dumps({"intrinsicMat": [1]}))
-    whole = {name: folder / name for name in ("easy", "colmap", "cal", "yaml", "xml", "biocv")}
+    whole = {name: folder / name for name in ("easy", "colmap", "yaml", "xml", "biocv")}
     return whole | {name: folder / name for name in texts if "/" not in name}

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import naive_limbs
 import numpy as np
 
+from benchmarks.speed import naive_multi as naive
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
-from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.geometry import Array
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-CLEANED = ("auto", "brightness", "colour", "both", "mog2", "knn")
+CLEANED = ("auto", "brightness", "colour", "both", "mog2")
 METHODS = (*CLEANED, "averaging")
 SIZE = (120, 160)
 WALL, SHIRT, SKIN = (150, 130, 110), (120, 45, 40), (110, 140, 190)  # blue green red

@@ -1,4 +1,4 @@
-"""Time offsets between films by their clocks: what each film states itself, by timecode, by its sound or by flashes of light."""
+"""Time offsets between films by their clocks: what each film states itself, by timecode or by its sound."""
 
 from __future__ import annotations
 
@@ -20,15 +20,14 @@ LEAST_RESIDUAL = 0.002
 class ClockOffsets:
     """Time offsets of films; plain values."""
 
-    by: Literal["timecode", "sound", "flashes"]
+    by: Literal["timecode", "sound"]
     names: tuple[str, ...]
     """Names of the cameras."""
     seconds: tuple[float | None, ...]
     """By which each film is late (negative: early): what happens comes that much later on its clock than on most others'; None if
     unknown."""
     spread: tuple[float | None, ...]
-    """Half-width of the 90 % interval, seconds: of sound its way to the cameras, of flashes the length of frames, and how the pairs differ;
-    of timecode half a frame."""
+    """Half-width of the 90 % interval, seconds: of sound its way to the cameras and how the pairs differ; of timecode half a frame."""
 
     @property
     def known(self) -> bool:
@@ -67,13 +66,13 @@ class PairOffset(NamedTuple):
     deviation: float
 
 
-def offsets_of_pairs(by: Literal["sound", "flashes"], names: Sequence[str], pairs: Sequence[PairOffset]) -> ClockOffsets:
-    """Offsets with a median of zero that leave the least sum of absolute residuals of the pairs' offsets."""
+def offsets_of_pairs(names: Sequence[str], pairs: Sequence[PairOffset]) -> ClockOffsets:
+    """Offsets by sound with a median of zero that leave the least sum of absolute residuals of the pairs' offsets."""
     count, stated = len(names), sorted({film for pair in pairs for film in (pair.first, pair.second)})
     seconds: list[float | None] = [None] * count
     spread: list[float | None] = [None] * count
     if not stated:
-        return ClockOffsets(by=by, names=tuple(names), seconds=tuple(seconds), spread=tuple(spread))
+        return ClockOffsets(by="sound", names=tuple(names), seconds=tuple(seconds), spread=tuple(spread))
     rows, target = np.zeros((len(pairs), count)), np.array([pair.seconds for pair in pairs])
     for n, pair in enumerate(pairs):
         rows[n, pair.first], rows[n, pair.second] = -1, 1
@@ -87,4 +86,4 @@ def offsets_of_pairs(by: Literal["sound", "flashes"], names: Sequence[str], pair
         own = [n for n, pair in enumerate(pairs) if film in (pair.first, pair.second)]
         deviation = np.hypot(np.median([pairs[n].deviation for n in own]), np.median(off[own]))
         seconds[film], spread[film] = round(float(late[film]), 4), round(QUANTILE * float(deviation), 4)
-    return ClockOffsets(by=by, names=tuple(names), seconds=tuple(seconds), spread=tuple(spread))
+    return ClockOffsets(by="sound", names=tuple(names), seconds=tuple(seconds), spread=tuple(spread))

@@ -59,7 +59,7 @@ def sound_offsets(names: Sequence[str], sounds: Sequence[Array | NDArray[np.floa
         if shift is not None:
             way = float(np.linalg.norm(centres[i] - centres[j])) / SPEED_OF_SOUND / np.sqrt(3)  # it comes from anywhere between the two
             pairs.append(PairOffset(i, j, shift + begins[j] - begins[i], float(np.hypot(PRECISION, way))))
-    return offsets_of_pairs("sound", names, pairs)
+    return offsets_of_pairs(names, pairs)
 
 
 def onset_strengths(samples: Array | NDArray[np.float32]) -> Array:

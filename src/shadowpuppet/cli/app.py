@@ -7,21 +7,26 @@ import sys
 from collections.abc import Sequence
 from typing import Literal
 
-from cyclopts import App, CycloptsError, UnusedCliTokensError
+from cyclopts import App, CycloptsError, Group, UnusedCliTokensError
 
 from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, is_out_of_memory, one_line, reason
 from shadowpuppet.output import say, say_text
+from shadowpuppet.removed import refuse_tokens
 
 COMMANDS = {
     "track": "track:track", "live": "track:live", "play": "track:play", "demo": "track:demo", "fit-person": "track:fit_person",
-    "info": "recordings:info", "synthesize": "recordings:synthesize", "humaneva": "recordings:humaneva",
+    "info": "recordings:info", "synthesize": "recordings:synthesize",
     "masks": "recordings:masks",
     "calibrate": "calibration.calibrate:calibrate",
     "check": "calibration.check:check", "fit-prior": "motion:fit_prior", "export": "motion:export", "convert": "motion:convert",
-    "evaluate": "evaluation:evaluate", "bench": "bench:bench", "batch": "batch:batch", "view": "viewer:view",
+    "evaluate": "evaluation:evaluate", "batch": "batch:batch", "view": "viewer:view",
     "settings": "app:settings", "completion": "app:completion", "doctor": "doctor:doctor",
 }  # fmt: skip
 """Module in this package and function of each command, by the command's name; loaded when used."""
+
+FIRST = ("track", "live", "info", "calibrate", "check", "masks", "view", "evaluate", "export", "synthesize", "demo")
+"""Commands that `--help` lists first; the others are under "More"."""
+_GROUPS = tuple(Group(name, sort_key=n) for n, name in enumerate(("Commands", "More")))
 
 
 def _version() -> str:
@@ -31,9 +36,9 @@ def _version() -> str:
 
 
 app = App(name="shadowpuppet", version=_version, help_format="plaintext", suppress_keyboard_interrupt=False,
-          help="Markerless motion capture from silhouettes.")
+          group_commands=_GROUPS[0], help="Markerless motion capture from silhouettes.")
 for _name, _place in COMMANDS.items():
-    app.command(f"shadowpuppet.cli.{_place}", name=_name)
+    app.command(f"shadowpuppet.cli.{_place}", name=_name, group=_GROUPS[_name not in FIRST])
 
 
 def settings(*, preset: str = "default") -> None:
@@ -74,6 +79,7 @@ def run(tokens: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code: 0, 2 for a user's mistake, 130 after Ctrl-C; 1 and 3 come from commands."""
     tokens = sys.argv[1:] if tokens is None else tokens
     try:
+        refuse_tokens(tokens)
         if not tokens or tokens[0] in app.help_flags:
             app.resolved_commands()  # the list of commands shows the first line of each one's help
         code = app(list(tokens), exit_on_error=False, print_error=False, result_action="return_value")

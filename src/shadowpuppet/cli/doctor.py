@@ -37,6 +37,8 @@ CODECS = {"H.264": "h264", "HEVC": "hevc", "VP9": "vp9", "AV1": "av1", "MPEG-4":
 """Common codecs, and FFmpeg's names of their decoders."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "safari", "microsoft-edge", "xdg-open", "open")
 MARKS = {"works": ("yes", "green"), "missing": ("no", "yellow"), "broken": ("broken", "red")}
+PACKAGES = ("shadowpuppet", "numpy", "numba", "llvmlite", "opencv-python-headless", "av")
+LEVELS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX"), ("neon", "NEON"))
 REPAIR = "python -m pip install --force-reinstall shadowpuppet"
 
 
@@ -141,36 +143,9 @@ def _libraries() -> Iterator[Finding]:
         yield Finding("libraries", "works", ", ".join(info), needed=True)
 
 
-def _weight() -> Iterator[Finding]:
-    """What the package and all that it needs weigh on disk, as installed, without extras and caches."""
-    sizes = sorted(((_size(name), name) for name in _needed("shadowpuppet")), reverse=True)
-    heaviest = ", ".join(f"{name} {size / 1e6:.0f}" for size, name in sizes[:6])
-    yield Finding("weight", "works", f"{sum(size for size, _ in sizes) / 1e6:.0f} MB: {heaviest}, {max(len(sizes) - 6, 0)} others")
-
-
-def _needed(name: str) -> set[str]:
-    """A distribution and, by their own statements, those that it needs, as far as they are installed; without extras."""
-    found, open_ends = set[str](), [name]
-    while open_ends:
-        name = re.sub(r"[-_.]+", "-", open_ends.pop()).lower()
-        try:
-            wanted = _required(name)
-        except metadata.PackageNotFoundError:  # of another system or Python
-            continue
-        if name not in found:
-            found.add(name)
-            open_ends += wanted
-    return found
-
-
 def _required(name: str) -> list[str]:
     """The distributions that one states to need, without extras. Raises `PackageNotFoundError`."""
     return [re.split(r"[^\w.-]", text, maxsplit=1)[0] for text in metadata.requires(name) or [] if "extra ==" not in text]
-
-
-def _size(name: str) -> int:
-    """Bytes of a distribution's files, as its installer recorded them."""
-    return sum(file.size or 0 for file in metadata.files(name) or [])
 
 
 def _kernels() -> Iterator[Finding]:
@@ -238,8 +213,25 @@ def _has_codec(av: object, name: str) -> bool:
     return True
 
 
+def environment() -> dict[str, Any]:
+    """Processor, cores, vector instructions, system and versions."""
+    import llvmlite.binding as llvm
+
+    features = llvm.get_host_cpu_features()
+    level = next((name for feature, name in LEVELS if features.get(feature)), "none known")
+    return {"cpu": _model(), "llvm_cpu": llvm.get_host_cpu_name(), "cores": os.cpu_count(), "vectors": level, "system": platform.platform(),
+            "python": platform.python_version(), **{name: metadata.version(name) for name in PACKAGES}}
+
+
+def _model() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
 def _processor() -> Iterator[Finding]:
-    from shadowpuppet.evaluation.bench.machine import environment
     from shadowpuppet.threads import THREADS_VARIABLE, thread_limit, usable_cores
 
     known = environment()
@@ -317,7 +309,7 @@ def _writable(folder: Path) -> bool:
 
 
 CHECKS: tuple[tuple[str, Callable[[], Iterator[Finding]], bool], ...] = (
-    ("Python", _python, True), ("libraries", _libraries, True), ("weight", _weight, False),
+    ("Python", _python, True), ("libraries", _libraries, True),
     ("kernels", _kernels, True), ("compiled code", _cache, False),
     ("films", _films, True), ("codecs", _codecs, False), ("processor", _processor, False), ("extras", _extras, False),
     ("masks", _external_masks, False), ("browser", _browser, False), ("cameras", _cameras, False),

@@ -1,11 +1,11 @@
-"""The commands about recordings: `info` describes one; `synthesize`, `humaneva` and `masks` make one."""
+"""The commands about recordings: `info` describes one; `synthesize` and `masks` make one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -38,10 +38,8 @@ from shadowpuppet.synthetic.spec_changes import SpecChanges, apply_changes
 from shadowpuppet.synthetic.spec_file import read_spec
 
 if TYPE_CHECKING:
-    from shadowpuppet.io.humaneva import HumanEva
     from shadowpuppet.io.masks.segmentation import MadeMasks
     from shadowpuppet.io.recording import Recording
-    from shadowpuppet.motion.motion import JointTable
 
     SpecFlags = Any
 else:
@@ -114,38 +112,6 @@ def synthesize(spec: Annotated[Path | None, Parameter(help="Spec file, TOML, as 
         show(_recording_table(chosen, recording))
         show_next(typed("info", recording.path), typed("track", recording.path, "--overlay"),
                   typed("synthesize", recording.path / "spec.toml", "-o", "FOLDER"))
-
-
-def humaneva(data: Annotated[Path, Parameter(help="Folder of HumanEva-I or II, with S1, S2, ...")], /, *,
-             folder: Annotated[Path | None, output("Folder of the recording. [default: the trial's name]")] = None,
-             subject: str = "S2", action: str = "Walking", trial: int = 1, part: Literal["validation", "training", "all"] = "validation",
-             training_frames: int = 100, quiet: Quiet = False) -> None:  # fmt: skip
-    """Make a recording of a trial of HumanEva, which needs a licence: calibration, timing, truth and training; films stay in their place.
-
-    Parameters
-    ----------
-    subject
-        S1 to S4.
-    action
-        Walking, Jog, Box, Gestures, ThrowCatch or Combo.
-    trial
-        Number of the trial.
-    part
-        Frames of HumanEva's own partition, or all; Ni 2008 tracks the validation part of S2.
-    training_frames
-        Consecutive frames of the training part of the same action that go into training.csv; 0 for all.
-    """
-    from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.io.humaneva import read_humaneva, write_humaneva
-
-    with terminal(quiet) as listener:
-        listener.begin("reading")
-        found = read_humaneva(data, subject, action, trial, part, training_frames)
-        folder = folder or Path(found.recording.name)
-        write_humaneva(found, folder)
-    if not quiet:
-        show(_trial_table(found, folder))
-        show_next(typed("track", folder, "-o", "RUN", "--overlay"), typed("evaluate", "RUN", "--joints", "humaneva"))
 
 
 def masks(source: Annotated[Path | None, Parameter(help="Folder with video/, or a film or folder of pictures.")] = None, /, *,
@@ -246,22 +212,3 @@ def _write_new(path: Path, text: str) -> None:
 
 def _gestures(spec: Spec) -> str:
     return ", ".join(f"{Path(gesture.file).name if gesture.file else gesture.motion} {gesture.seconds:g}" for gesture in spec.motion)
-
-
-def _trial_table(found: HumanEva, folder: Path) -> Any:
-    """Table of the contents of a trial of HumanEva."""
-    views, duration = found.recording.views, found.recording.duration
-    names = ", ".join(view.camera.name for view in views)
-    return pairs([
-        ("recording", str(folder)), ("films", f"{len(views)} cameras: {names}, {duration:.2f} s"),
-        ("truth", _joints_known(found.truth)), ("training", _joints_known(found.training)),
-    ])  # fmt: skip
-
-
-def _joints_known(joints: JointTable | None) -> str:
-    import numpy as np
-
-    if not joints:
-        return "none there"
-    known = 100 * float(np.isfinite(joints.positions).all(2).mean())
-    return f"{len(joints.times)} frames of {len(joints.names)} joints, {known:.0f} % known"

@@ -152,7 +152,7 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
     def _seen_before(self, found: Sequence[Scene]) -> None:
         """Use new silhouettes before the scenes."""
         self.scene = [[] if scene.recovered else scene.pictures for scene, _ in found]
-        self._segment = [silhouettes.following() for _, silhouettes in found]
+        self._segment = [silhouettes.segmented for _, silhouettes in found]
 
     def _look_again(self, now: float, images: Images, fits: bool) -> bool:
         """From time to time find the scenes that were not seen empty again in all pictures so far. Whether they were, while the body does

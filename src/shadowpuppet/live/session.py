@@ -217,7 +217,7 @@ class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
 
     def _seen_before(self, scene: EmptyScene, tracked: Silhouettes, clean: Silhouettes) -> None:
         """Use new silhouettes before a scene."""
-        self._scene, self._clean, self._segment = scene, clean, tracked.following()
+        self._scene, self._clean, self._segment = scene, clean, tracked.segmented
 
     def _scaled(self, shot: Snapshot) -> tuple[Image, ...]:
         return (scaled(shot.image, self.camera),)

@@ -61,7 +61,7 @@ class Task:
 
     def frames(self) -> Generator[FrameSet]:
         """The frame sets, made here."""
-        segment = [each.following() for each in self.silhouettes]
+        segment = [each.segmented for each in self.silhouettes]
         with closing(read_frames(self.rig, segment, ready=self.ready, every=self.every)) as frames:
             for each in frames:
                 begin = time.perf_counter()

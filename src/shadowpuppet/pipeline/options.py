@@ -16,6 +16,7 @@ from shadowpuppet.body.sizes import DISTANCES, HEIGHTS, expected_metres
 from shadowpuppet.errors import SettingsError, choices, warn
 from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.motion.prior.settings import PriorSettings
+from shadowpuppet.removed import without_removed
 from shadowpuppet.settings import checked, plain_values, settings_of, validate
 from shadowpuppet.silhouette.settings import SilhouetteSettings
 from shadowpuppet.tracking.monocular.settings import (
@@ -138,7 +139,7 @@ class Options:
 
 def make_options(values: Mapping[str, Any] | None = None, source: str = "settings") -> Options:
     """Options from plain values, as in TOML; tables may be partial and override the preset. Raises `SettingsError`."""
-    values = dict(values or {})
+    values = without_removed(values or {}, source)
     for table in TABLES:
         if not isinstance(values.get(table, {}), Mapping):
             raise SettingsError(f"{source}: {table}: found {values[table]!r}, expected a table [{table}]")

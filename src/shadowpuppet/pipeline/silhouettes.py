@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,7 +14,6 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import RecoveredScene, Segmenter, SilhouetteSettings, learn_background, ready_mask, recover_scene
 from shadowpuppet.silhouette.added import AddedParts, StillParts, find_still
 from shadowpuppet.silhouette.clutter import Clutter, find_clutter
-from shadowpuppet.silhouette.maintenance import MaintainedSegmenter
 from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.video import Image
 
@@ -54,13 +53,6 @@ class Silhouettes:
             ready = frame.image if frame.ready is None else frame.ready
             return self._kept(Segmented(ready_mask(ready), image=None if frame.ready is None else frame.image))
         return self._kept(self.segmenter.segmented(self.segmenter.labelled(frame.image)))
-
-    def following(self) -> Callable[[CameraFrame], Segmented]:
-        """Makes the silhouettes of the film's frames, one after another; with `maintain` the background follows lasting changes."""
-        if self.segmenter is None or not self.segmenter.settings.maintain:
-            return self.segmented
-        maintained = MaintainedSegmenter(self.segmenter)
-        return lambda frame: self._kept(maintained.segmented(frame.image, frame.time))
 
     def of_several(self) -> Silhouettes:
         """A copy whose masks keep everybody in the picture, not only the largest part."""
@@ -158,7 +150,7 @@ def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
     """Masks (H, W) of the film's frames, one after another, as `track_recording` makes them. Raises `SilhouetteError` or
     `SettingsError`."""
     silhouettes = uncluttered_silhouettes(footage, take_sample(footage, options.masks), options)
-    segment = silhouettes.following()
+    segment = silhouettes.segmented
     return (segment(frame).mask for frame in footage.frames(ready=options.masks))
 
 

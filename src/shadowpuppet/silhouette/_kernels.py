@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.jit import compiled, device
+from shadowpuppet.jit import compiled
 
 NEUTRAL = 128.0
 """Cr and Cb of a grey pixel, 8 bit."""
@@ -105,84 +105,3 @@ def some_parts(parts, chosen, out):
     for y in range(parts.shape[0]):
         for x in range(parts.shape[1]):
             out[y, x] = np.uint8(chosen[parts[y, x]])
-
-
-@compiled(nogil=True)
-def far_from_samples(image, samples, squared_radius, needed, out):
-    """Set `out` (H, W) to 1 for pixels of an image (H, W, C) that are near to fewer than `needed` of the samples (N, H, W, C), else to 0.
-
-    All are uint8; near: within `squared_radius`, the square of a distance in grey levels.
-    """
-    for y in range(image.shape[0]):
-        for x in range(image.shape[1]):
-            near = 0
-            for n in range(samples.shape[0]):
-                squared = 0
-                for c in range(image.shape[2]):
-                    difference = np.int32(image[y, x, c]) - np.int32(samples[n, y, x, c])
-                    squared += difference * difference
-                near += squared <= squared_radius
-                if near >= needed:
-                    break
-            out[y, x] = near < needed
-
-
-@device
-def _explained(planes, scene, shift, inverse_sigma, factor):
-    """Whether a pixel's Y, Cr, Cb are the scene's with a share of a shift, 0 to 1.1 of it, to `factor` standard deviations."""
-    along, length, squared = np.float32(0), np.float32(1e-6), np.float32(0)
-    for c in range(3):
-        weight = inverse_sigma[c] * inverse_sigma[c]
-        along += weight * (planes[c] - scene[c]) * shift[c]
-        length += weight * shift[c] * shift[c]
-    share = min(max(along / length, np.float32(0)), np.float32(1.1))
-    for c in range(3):
-        each = (planes[c] - scene[c] - share * shift[c]) * inverse_sigma[c]
-        squared += each * each
-    return squared <= factor * factor
-
-
-@compiled(nogil=True)
-def watch(label, held, planes, scene, shift, inverse_sigma, factor, ages, slow, age, before, due):
-    """Number of pixels that are to become background as they look now; they are set in `due` (H, W).
-
-    1 in `due`: they have looked alike, unlike the background, for long enough; 2: the same beside pixels that have changed, or they look,
-    for the second time, like the scene as learnt, or as if the scene there had changed as it has around them. A pixel on or near the person
-    that looks as before neither ages nor starts again.
-
-    label: of the pixels (H, W), 0 background; held (H, W): 2 on the person, 1 near them, else 0; planes (H, W, 3), uint8, Y, Cr, Cb,
-    smoothed; scene: the same as learnt, and shift: how the background has changed around a pixel, 0 where it has not, both (H, W, 3),
-    float32; factor: greatest difference that counts as alike, over the standard deviation; ages: how often a pixel must look alike where
-    the person was not, and where they were.
-
-    State: slow (H, W, 3), mean of what a pixel has looked like; age (H, W), how often; before (H, W), 1 where the person was since it was
-    background last, 2 more where it was explained the last time. A due pixel starts again.
-    """
-    number = 0
-    for y in range(label.shape[0]):
-        for x in range(label.shape[1]):
-            if label[y, x] == 0:
-                age[y, x] = before[y, x] = 0
-                continue
-            near, past = np.int64(held[y, x]), np.int64(before[y, x])
-            stood, again = past % 2, past >= 2
-            far = np.float32(0)
-            for c in range(3):
-                far = max(far, abs(planes[y, x, c] - slow[y, x, c]) * inverse_sigma[y, x, c])
-            alike = far <= factor
-            explained = _explained(planes[y, x], scene[y, x], shift[y, x], inverse_sigma[y, x], factor)
-            if near and not alike:
-                age[y, x], stood = 0, max(stood, near // 2)
-            elif not near:
-                age[y, x] = age[y, x] + 1 if alike and age[y, x] else 1
-            lasting = not near and age[y, x] >= ages[stood]
-            beside = shift[y, x, 0] != 0 or shift[y, x, 1] != 0 or shift[y, x, 2] != 0
-            due[y, x] = 2 if (explained and again) or (lasting and beside) else int(lasting)
-            share = np.float32(1) / max(age[y, x], 1) if alike and not explained else np.float32(1)
-            for c in range(3):
-                slow[y, x, c] += (planes[y, x, c] - slow[y, x, c]) * share
-            before[y, x] = stood + 2 * int(explained)
-            if due[y, x]:
-                age[y, x] = before[y, x] = 0
-                number += 1
-    return number

@@ -14,13 +14,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.camera.mask import Window
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette.background import (
     SMOOTHING,
     Background,
     Floats,
-    FrameSampler,
     Image,
     smoothed,
     to_brightness,
@@ -39,12 +37,6 @@ SHADOW_CHANNELS = {"brightness": (1, 1, 1), "colour": (0, 1, 1), "both": (1, 1, 
 dark clothes would look like shadow."""
 CERTAIN_FACTOR = 2.0
 """Threshold of pixels that surely belong to a person, over that of pixels that may."""
-SAMPLE_RADIUS = 20
-"""Grey levels within which a pixel is near to a sample of the background (OpenCV's dist2Threshold is its square)."""
-MIN_NEAR_SAMPLES = 2
-"""Least number of samples that a background pixel is near to."""
-MIN_SAMPLES = 7
-"""Number of samples kept, at most twice as many."""
 ROUNDING_MARGIN = 1 - 1e-4
 """Factor on a threshold that keeps it on the safe side of single precision."""
 
@@ -141,27 +133,6 @@ class ChannelClassifier:
         lowest, highest = np.ceil(self.mean - reach), np.floor(self.mean + reach)
         return np.clip(lowest, 0, 255).astype(np.uint8), np.clip(highest, 0, 255).astype(np.uint8)
 
-    @cached_property
-    def least_sigma(self) -> Floats:
-        """Least assumed standard deviation in the picture, of shape (3,)."""
-        return np.asarray(1 / self.inverse_sigma.max(axis=(0, 1)), np.float32)
-
-    def with_scene(self, mean: Floats, window: Window) -> ChannelClassifier:
-        """A copy whose background looks like `mean` (H, W, 3), Y, Cr, Cb, not smoothed, in a window of rows and columns. The standard
-        deviation assumed there is the picture's least one, increased at edges."""
-        reach = 2 * round(2 * self.smoothing + 1)
-        rows, columns = (slice(max(each.start - reach, 0), each.stop + reach) for each in window)
-        inner = tuple(slice(each.start - wide.start, each.stop - wide.start) for each, wide in zip(window, (rows, columns)))
-        smooth = smoothed(np.ascontiguousarray(mean[rows, columns]), self.smoothing)
-        sigma = np.hypot(self.least_sigma, edge_jitter(smooth))
-        part = replace(self, mean=smooth[inner], inverse_sigma=(1 / sigma).astype(np.float32)[inner])
-        out = replace(self, mean=self.mean.copy(), inverse_sigma=self.inverse_sigma.copy())
-        lowest, highest = (bound.copy() for bound in self.surely_background)
-        out.mean[window], out.inverse_sigma[window] = part.mean, part.inverse_sigma
-        lowest[window], highest[window] = part.surely_background
-        out.__dict__.update(surely_background=(lowest, highest), least_sigma=self.least_sigma)  # only the window's are computed again
-        return out
-
 
 def edge_jitter(mean: np.ndarray) -> np.ndarray:
     """Standard deviation that is assumed at the edges of a smoothed background (H, W, 3), beyond that elsewhere."""
@@ -227,30 +198,6 @@ class MixtureClassifier:
         return np.where(self._subtractor.apply(image, learningRate=0) == 255, 2, 0).astype(np.uint8)
 
 
-@dataclass(frozen=True, eq=False)
-class NeighbourClassifier:
-    """Classifier by nearest neighbours: foreground pixels are near to hardly any picture of the empty scene (Zivkovic & van der Heijden
-    2006).
-
-    The constants are those of OpenCV's KNN subtractor. OpenCV's class cannot be used: it learns even at a learning rate of 0, so a mask
-    would depend on earlier frames.
-    """
-
-    samples: NDArray[np.uint8]
-    """Pictures of the empty scene, of shape (N, H, W, C)."""
-    shadows: ChannelClassifier | None
-    """If given, pixels that this classifier labels background, shadows included, are background too."""
-
-    def __call__(self, image: Image) -> Labels:
-        """Labels (H, W), 0 or 2, of a picture (H, W, 3) or (H, W)."""
-        from shadowpuppet.silhouette._kernels import far_from_samples
-
-        far = np.empty(image.shape[:2], np.uint8)
-        deep = np.ascontiguousarray(image).reshape(*image.shape[:2], -1)
-        far_from_samples(deep, self.samples, SAMPLE_RADIUS * SAMPLE_RADIUS, min(MIN_NEAR_SAMPLES, len(self.samples)), far)
-        return 2 * far if self.shadows is None else 2 * (far & (self.shadows(image) > 0))
-
-
 class EmptyScene(NamedTuple):
     """What a method builds its classifier from."""
 
@@ -283,16 +230,9 @@ def _averaging(scene: EmptyScene) -> Classifier:
     return AveragingClassifier.of_background(scene.background, scene.settings.factor)
 
 
-def _neighbours(scene: EmptyScene) -> Classifier:
-    samples = np.stack(scene.observer.kept)
-    shadows = scene.channels if scene.channels.darkest < 1 else None
-    return NeighbourClassifier(samples.reshape(*samples.shape[:3], -1), shadows)
-
-
 METHODS: dict[str, Method] = {
     **{key: _by_channels(key) for key in KEY_CHANNELS},
     "averaging": Method(_averaging, contrast=KEY_CHANNELS["brightness"]),
     "mog2": Method(lambda scene: scene.observer, lambda settings: MixtureClassifier(settings.shadow)),
-    "knn": Method(_neighbours, lambda settings: FrameSampler(MIN_SAMPLES)),
 }
 """Segmentation methods by the name that the setting `method` gives them; `auto` chooses one of the first three."""

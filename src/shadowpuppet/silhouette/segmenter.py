@@ -48,8 +48,7 @@ class Segmented(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Segmenter:
-    """A learnt background: `segmenter(image)` is the mask of the person. It has no state: a mask depends on its frame alone
-    (`maintenance.MaintainedSegmenter` has one).
+    """A learnt background: `segmenter(image)` is the mask of the person. It has no state: a mask depends on its frame alone.
 
     The steps of a call, in order:
 
@@ -59,7 +58,7 @@ class Segmenter:
        the detail that compression has taken (`correction.detail.LostDetail`).
     3. Classify every pixel (`classifier`): convert to Y, Cr, Cb, smooth (`background.smoothed`), compare with the background in units of
        its standard deviation (`_kernels.classify`), and decide between dark limbs and shadows (`shadows.resolve_shadows`).
-       `averaging`, `mog2` and `knn` have comparisons of their own.
+       `averaging` and `mog2` have comparisons of their own.
     4. Clean up (`cleanup.clean`, if the setting `clean` asks for it): remove specks, keep the largest part and what nearly touches it,
        move the outline to half the contrast of the unsmoothed frame (`boundary.at_half_contrast`), fill small holes.
 

@@ -21,11 +21,11 @@ class SilhouetteSettings:
 
     method: Method = "auto"
     """Segmentation method. `brightness`, `colour` (Cr and Cb) and `both` name the channels that are compared with the background; `auto`
-    chooses the one of these three that suits the background. `averaging` is eq. 1; `mog2`, a mixture of Gaussians, and `knn`, nearest
-    neighbours, are frozen after learning."""
+    chooses the one of these three that suits the background. `averaging` is eq. 1; `mog2`, a mixture of Gaussians, is frozen
+    after learning."""
     factor: Annotated[float, Field(gt=0, le=100)] = 2.0
     """Least difference of a foreground pixel from the background, standard deviations (eq. 1). With brightness, colour and both it must
-    also be connected to pixels that differ by twice as much; mog2 and knn have thresholds of their own."""
+    also be connected to pixels that differ by twice as much; mog2 has thresholds of its own."""
     noise_floor: Annotated[float, Field(ge=0, le=100)] = 2.5
     """Least assumed standard deviation (grey levels; three quarters of it for colour). Not used by `averaging`."""
     shadow: bool = True
@@ -36,9 +36,6 @@ class SilhouetteSettings:
     stabilise: bool | None = None
     """Whether to follow a nudged or shaking camera, frame by frame, so that masks are those of a camera that stands still. By default for
     every method but `averaging`."""
-    maintain: bool = False
-    """Whether the background follows lasting changes while tracking: things smaller than the person that were moved and stay, light that
-    wanders slowly. Not for a person who hardly moves, who may become background."""
     clean: bool | None = None
     """Whether to remove specks and small holes, keep only the person, and move the outline to half of the contrast. By default for
     every method but `averaging`."""

@@ -111,7 +111,7 @@ def humaneva() -> tuple[Spec, ...]:
     """Recordings like those of Ni 2008's experiments (VI): seven cameras of 640 x 480 at 60 frames/s; 433 frames of walking, 393 of jogging
     and 377 of boxing; and 100 training frames of the same person's joints.
 
-    HumanEva itself needs a licence (`io.humaneva`). Here people move by published angles, not by motion capture, and the training motion
+    HumanEva itself needs a licence (papers/humaneva). Here people move by published angles, not by motion capture, and the training motion
     is another performance of the same gestures.
     """
     return tuple(_humaneva(n, *row) for n, row in enumerate(HUMANEVA))

@@ -26,7 +26,7 @@ from shadowpuppet.io.calibration.opencv_storage import read_storage
 from shadowpuppet.io.calibration.vicon import ViconDistortion, opencv_distortion
 from shadowpuppet.io.recording import read_recording
 
-KINDS = ("anipose.toml", "freemocap.toml", "camera_array.toml", "Calib.qca.txt", "easy", "cal", "yaml", "xml", "KRT", "biocv")
+KINDS = ("anipose.toml", "freemocap.toml", "camera_array.toml", "Calib.qca.txt", "easy", "yaml", "xml", "KRT", "biocv")
 """That hold OpenCV's own lens; Vicon's is another."""
 SCRATCH = [HealthCheck.function_scoped_fixture]
 
@@ -63,7 +63,7 @@ def test_every_kind_tells_the_same_cameras(files, made, kind, rng):
 
 
 @pytest.mark.parametrize(("kind", "unit", "told"), [
-    ("freemocap.toml", "mm", True), ("Calib.qca.txt", "mm", True), ("session.xcp", "mm", True), ("cal", "mm", True),
+    ("freemocap.toml", "mm", True), ("Calib.qca.txt", "mm", True), ("session.xcp", "mm", True),
     ("biocv", "mm", True), ("KRT", "m", False), ("camchain.yaml", "m", True),
     ("anipose.toml", "m", False), ("easy", "m", False),
 ])
@@ -299,7 +299,7 @@ def test_hostile_and_broken_files_are_said(tmp_path, text, words):
 
 
 def test_a_huge_file_and_no_calibration_are_said(tmp_path):
-    for name in ("a.yml", "a.xcp", "a.qca.txt", "a.cal"):
+    for name in ("a.yml", "a.xcp", "a.qca.txt"):
         with (tmp_path / name).open("wb") as file:
             file.write(b"<calibration><camera>" if name == "a.qca.txt" else b"")
             file.truncate(11_000_000)
@@ -313,7 +313,7 @@ def test_a_huge_file_and_no_calibration_are_said(tmp_path):
 INSERTED = (b"nan", b"-", b"9" * 400, b"<", b"]", b"\n", b"[cam_0]\n", b"\xff", b"1e308", b":", b"\0")
 PIECES = {"anipose.toml": calibrations.toml, "camera_array.toml": calibrations.caliscope, "a.qca.txt": calibrations.qualisys,
           "a.xcp": calibrations.vicon, "a.yml": lambda made: calibrations.opencv(made[0]),
-          "a.xml": lambda made: calibrations.opencv_xml(made[0]), "a.cal": lambda made: calibrations.cal(made[0])}  # fmt: skip
+          "a.xml": lambda made: calibrations.opencv_xml(made[0])}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", PIECES)
@@ -364,7 +364,7 @@ def test_a_distortion_that_no_lens_has_is_said(tmp_path, files):
 
 
 @settings(max_examples=30, suppress_health_check=SCRATCH, deadline=None)
-@given(st.binary(max_size=200), st.sampled_from(["x.toml", "x.yml", "x.xml", "x.xcp", "x.qca.txt", "x.cal", "x"]))
+@given(st.binary(max_size=200), st.sampled_from(["x.toml", "x.yml", "x.xml", "x.xcp", "x.qca.txt", "x"]))
 @example(b"\x80\x04cos\nsystem\n", "x.yml")
 def test_any_bytes_are_said(tmp_path, content, name):
     (tmp_path / name).write_bytes(content)
@@ -385,10 +385,6 @@ def test_a_recording_may_have_any_of_them(tmp_path, made, files):
         for a, b in zip(found, small, strict=True):
             np.testing.assert_allclose(a.T_camera_world, b.T_camera_world, atol=1e-7)
         (folder / name).unlink()
-    (folder / "calibration").mkdir()
-    for camera in small:
-        (folder / "calibration" / f"{camera.name}.cal").write_text(calibrations.cal(camera))
-    assert [view.camera.size for view in read_recording(folder).views] == [made_rig.SIZE] * 3  # by the films: .cal has none
     (folder / "intri.yml").write_text(calibrations.intri(small, sizes=False))
     (folder / "extri.yml").write_text(calibrations.extri(small))
     assert find_calibration(folder) == folder

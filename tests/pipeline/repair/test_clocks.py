@@ -15,7 +15,6 @@ from shadowpuppet.pipeline.repair.clocks import clock_offsets, in_step
 from shadowpuppet.pipeline.repair.films import check_films
 from shadowpuppet.pipeline.repair.fix import fix_recording
 from shadowpuppet.pipeline.rig import open_rig
-from shadowpuppet.video import open_frames, write_frames
 
 MASKS = Options(masks=True)
 RATE = 16000
@@ -120,29 +119,3 @@ def test_no_start_becomes_negative(still):
     assert min(starts) == 0
     assert [view.start for view in moved.recording.views] == starts
     assert np.diff(starts) == pytest.approx(np.diff(LATE) / made_rig.RATE, abs=0.03)
-
-
-def with_flashes(path, late, frames=(20, 33)):
-    """Lights up frames of a recording's films, later in those that are late."""
-    for k, each in enumerate(late):
-        film = path / "video" / f"cam{k + 1}.mp4"
-        images = [frame.image for frame in open_frames(film)]
-        with write_frames(film, made_rig.RATE) as out:
-            for n, image in enumerate(images):
-                out.write(np.clip(image.astype(int) + 70, 0, 255).astype(np.uint8) if n - each in frames else image)
-
-
-def test_silent_films_of_a_still_person_are_put_in_step_by_flashes(tmp_path):
-    path = films(tmp_path / "flash", lambda n, k: 12, None)
-    with_flashes(path, LATE)
-    found = check_films(open_rig(path, MASKS), MASKS).check
-    assert (found.clock.by, found.by_clock, found.late) == ("flashes", True, ("cam2", "cam4"))
-    assert found.lateness.frames == pytest.approx(LATE, abs=0.1)
-
-
-def test_each_camera_s_own_flash_is_doubted_and_changes_nothing(tmp_path):
-    path = films(tmp_path / "own", lambda n, k: n + 12, None)
-    with_flashes(path, LATE)  # the pictures are in step
-    found = check_films(open_rig(path, MASKS), MASKS).check
-    assert (found.by_clock, found.late) == (False, ())
-    assert found.doubts[-1].startswith("flashes and silhouettes disagree about the films' delays")

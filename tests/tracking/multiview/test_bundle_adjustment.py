@@ -10,11 +10,11 @@ import pytest
 from scans import make_body as random_tree
 from scans import scan, some_pose
 
+from benchmarks.speed import naive_multi as naive
 from shadowpuppet.body.models import shares_of
 from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.tracking.multiview import bundle_adjustment
 from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, make_cloud

@@ -23,6 +23,7 @@ from shadowpuppet.motion.synchronization import at_times, match, step_of
 from shadowpuppet.pipeline.footage import camera_footage, chosen_views, open_recording
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.overlay_video import grid_of
+from shadowpuppet.removed import of_earlier_run
 
 if TYPE_CHECKING:
     from shadowpuppet.video import Image
@@ -141,7 +142,7 @@ def _of_recording(of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[s
     path, settings = of.run.info.get("recording"), of.run.settings
     if not isinstance(path, str) or not Path(path).exists():
         raise ShadowPuppetError(f"the run has no overlay.mp4, and its recording, {path}, is not there")
-    options = make_options(settings) if settings else Options()
+    options = make_options(of_earlier_run(settings)) if settings else Options()
     recording = open_recording(path, options)
     views = chosen_views(recording, options.camera)
     motion = of.run.motion

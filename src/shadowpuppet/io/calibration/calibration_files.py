@@ -56,7 +56,7 @@ def read_calibration(path: str | Path, *, unit: str | None = None, up: str | Non
 
     Formats, recognised by content: JSON with K, R and t a camera, COLMAP's text, TOML of Pose2Sim, Anipose, FreeMoCap and Caliscope (its
     own and its export), OpenCV's YAML and XML, EasyMocap's pair, Kalibr's camera chain, KRT, BioCV's .calib, Qualisys' .qca.txt, Vicon's
-    .xcp, HumanEva's .cal. Raises `CalibrationError` with the file, camera and field if
+    .xcp. Raises `CalibrationError` with the file, camera and field if
     something is missing or impossible.
 
     Args:

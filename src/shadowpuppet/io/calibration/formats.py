@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from shadowpuppet.errors import CalibrationError, check_regular, choices, reason
-from shadowpuppet.io.calibration.bouguet import read_bouguet
 from shadowpuppet.io.calibration.colmap import is_colmap, read_colmap
 from shadowpuppet.io.calibration.draft import Drafts
 from shadowpuppet.io.calibration.json_cameras import mentions_cameras, read_json
@@ -19,6 +18,7 @@ from shadowpuppet.io.calibration.pose2sim import read_tables
 from shadowpuppet.io.calibration.qualisys import read_qualisys
 from shadowpuppet.io.calibration.rough import ROUGH_NAME, is_rough, read_rough
 from shadowpuppet.io.calibration.vicon import read_vicon
+from shadowpuppet.removed import FILES
 
 ENDINGS = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".cal", ".calib", ".krt", ".pickle", ".pkl")
 """Endings of files that may be calibrations."""
@@ -52,7 +52,6 @@ EASYMOCAP = Format("EasyMocap (intri.yml, extri.yml)",
                    lambda path, text: path.stem in ("intri", "extri") and _ends(path, *SUFFIXES), read_opencv)
 OPENCV = Format("OpenCV (YAML, XML)",
                 lambda path, text: _ends(path, *SUFFIXES) or "<opencv_storage" in text or "!!opencv-matrix" in text, read_opencv)
-HUMANEVA = Format("HumanEva (.cal)", lambda path, text: _ends(path, ".cal"), read_bouguet)
 TABLES = Format("TOML (Pose2Sim, Anipose, FreeMoCap, Caliscope)",
                 lambda path, text: _ends(path, ".toml") or all(f"\n{key}" in f"\n{text}" for key in ("matrix", "distortions")), read_tables)
 ROUGH = Format("rough places (TOML with at, toward, fov)", lambda path, text: path.name == ROUGH_NAME or is_rough(text), read_rough)
@@ -61,21 +60,24 @@ JSON = Format("JSON", lambda path, text: _ends(path, ".json"), read_json)
 KALIBR = Format("Kalibr (camchain.yaml)", lambda path, text: CAMERA.search(text) is not None and "camera_model" in text, read_kalibr)
 BIOCV = Format("BioCV (.calib)", lambda path, text: _ends(path, ".calib"), read_biocv)
 KRT = Format("KRT", lambda path, text: path.stem.upper() == "KRT" or _ends(path, ".krt"), read_krt)
-FORMATS = (JSON, COLMAP, QUALISYS, VICON, EASYMOCAP, KALIBR, OPENCV, HUMANEVA, BIOCV, KRT, ROUGH, TABLES)
+FORMATS = (JSON, COLMAP, QUALISYS, VICON, EASYMOCAP, KALIBR, OPENCV, BIOCV, KRT, ROUGH, TABLES)
 """All formats, in the order in which they are tried."""
 
 
 def format_of(path: Path) -> Format:
     """The format of a file or folder. Raises `CalibrationError` if it is none of `FORMATS`."""
+    kinds = (path.suffix.lower(), *({file.suffix.lower() for file in path.iterdir()} & {".cal"} if path.is_dir() else ()))
+    for kind in kinds:
+        if kind in FILES:
+            raise CalibrationError(f"{path}: {FILES[kind]}")
     if path.is_dir():
-        for kind, ending in ((HUMANEVA, "*.cal"), (BIOCV, "*.calib")):
-            if any(path.glob(ending)):
-                return kind
+        if any(path.glob("*.calib")):
+            return BIOCV
         if is_colmap(path):
             return COLMAP
         if not files_of(path):
             raise CalibrationError(f"{path}: is a directory, and no calibration is in it that takes a whole one, expected a file, a folder "
-                                   "with EasyMocap's intri.yml and extri.yml, or one with a .cal, .calib or OpenCV file a camera")
+                                   "with EasyMocap's intri.yml and extri.yml, or one with a .calib or OpenCV file a camera")
         return EASYMOCAP if any(file.stem in ("intri", "extri") for file in files_of(path)) else OPENCV
     try:
         check_regular(path)
@@ -98,7 +100,7 @@ def is_calibration(path: Path) -> bool:
     try:
         kind = format_of(path)
     except CalibrationError:
-        return path.suffix.lower() in (".pickle", ".pkl")
+        return path.suffix.lower() in (".pickle", ".pkl", ".cal")
     if kind is JSON:
         return mentions_cameras(path)
     if path.is_file() and kind is TABLES:

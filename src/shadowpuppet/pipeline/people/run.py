@@ -144,7 +144,7 @@ class PeopleRun:
 
     def _silhouettes_of(self, wanted: Sequence[Stretch]) -> list[Packed]:
         """The silhouettes of some stretches, read again, without those of cameras that were set aside."""
-        segment, last, found = [each.following() for each in self.survey.silhouettes], max(each.until for each in wanted), list[Packed]()
+        segment, last, found = [each.segmented for each in self.survey.silhouettes], max(each.until for each in wanted), list[Packed]()
         with closing(read_frames(self.rig, segment, ready=self.options.masks, every=self.options.every)) as frames:
             for now in frames:
                 if now.time >= last:

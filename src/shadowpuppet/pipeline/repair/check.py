@@ -74,7 +74,7 @@ class CalibrationCheck:
     turns: dict[str, RotationFix]
     """Rotations that explain the disagreement of cameras, by camera name."""
     clock: ClockOffsets | None = None
-    """Offsets of the films by their timecode, sound or flashes; None if fewer than two have any."""
+    """Offsets of the films by their timecode or sound; None if fewer than two have any."""
     by_clock: bool = False
     """Whether the films were put in step by that before silhouettes were compared."""
     doubts: tuple[str, ...] = ()

@@ -1,8 +1,7 @@
-"""Reads the clocks of a recording's films, timecode, sound or flashes of light, and puts them in step by these."""
+"""Reads the clocks of a recording's films, timecode or sound, and puts them in step by these."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -10,55 +9,26 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shadowpuppet.calibration.clock_offset import ClockOffsets, timecode_offsets
-from shadowpuppet.calibration.flash_offset import Light, flash_offsets
 from shadowpuppet.calibration.sound_offset import RATE, sound_offsets
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError
+from shadowpuppet.errors import VideoError
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.threads import usable_cores
-from shadowpuppet.video import open_frames
 from shadowpuppet.video.sound import Sound, read_sound
 from shadowpuppet.video.timecode import read_timecode
 
 Stated = TypeVar("Stated")
 LONGEST = 300.0
 """Seconds of a film that are listened to."""
-LIGHT_READ, LIGHT_SIZE = 30.0, (16, 12)
-"""Seconds of a film that are searched for flashes, and the size that its pictures are scaled to for that."""
 
 
 def clock_offsets(rig: Rig) -> ClockOffsets | None:
-    """Offsets of the films by their timecodes; if these tell nothing, by their sound, then by flashes; None if none of them does, and fewer
-    than two films have sound."""
+    """Offsets of the films by their timecodes; if these tell nothing, by their sound; None if fewer than two films have sound."""
     codes = [_read(footage, read_timecode) for footage in rig.footage]
     stated = timecode_offsets(rig.names, codes, [footage.view.start for footage in rig.footage], rig.rate)
-    if stated is not None:
-        return stated
-    heard = heard_offsets(rig)
-    if heard is not None and heard.known:
-        return heard
-    seen = seen_offsets(rig)
-    return seen if seen.known else heard
-
-
-def seen_offsets(rig: Rig) -> ClockOffsets:
-    """Offsets of the films by flashes in their first seconds, beside the starts that the recording states."""
-    with warnings.catch_warnings(), ThreadPoolExecutor(usable_cores(), "light") as pool:
-        warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when a run comes to it
-        return flash_offsets(rig.names, list(pool.map(_light_of, rig.footage)))
-
-
-def _light_of(footage: Footage) -> Light:
-    times, parts = list[float](), list[NDArray[np.float64]]()
-    for time, image in open_frames(footage.view.video, grey=True, size=LIGHT_SIZE, rate=footage.recording.rate):
-        if time > LIGHT_READ:
-            break
-        times.append(time - footage.view.start)
-        parts.append(image.astype(float).ravel())
-    return Light(np.array(times), np.array(parts))
+    return heard_offsets(rig) if stated is None else stated
 
 
 def heard_offsets(rig: Rig) -> ClockOffsets | None:

@@ -25,8 +25,7 @@ from shadowpuppet.pipeline.repair.clocks import clock_offsets, in_step
 from shadowpuppet.pipeline.rig import Rig
 
 DISAGREE = {"sound": "sound and silhouettes disagree about the films' delays: does the sound of a film lag behind its pictures?",
-            "timecode": "timecodes and silhouettes disagree about the films' delays: were the cameras' clocks set together?",
-            "flashes": "flashes and silhouettes disagree about the films' delays: did each camera see a flash of its own?"}
+            "timecode": "timecodes and silhouettes disagree about the films' delays: were the cameras' clocks set together?"}
 SAME_PIXELS = 0.1
 """Mean disagreement by which films put in step by their clocks may be worse if the person hardly moves, so that silhouettes cannot tell."""
 

@@ -23,6 +23,7 @@ from shadowpuppet.motion.mesh import body_mesh
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.pipeline.footage import open_recording
 from shadowpuppet.pipeline.options import Options, make_options
+from shadowpuppet.removed import of_earlier_run
 from shadowpuppet.viewer.scene.figures import LimbStatuses, animation_figure, joint_figure
 from shadowpuppet.viewer.scene.film_images import hull_function
 from shadowpuppet.viewer.scene.of_recording import cameras_of
@@ -97,7 +98,7 @@ class _Run:
     @cached_property
     def options(self) -> Options:
         """The settings of the run."""
-        return make_options(self.run.settings, str(self.run.folder / "run.toml")) if self.run.settings else Options()
+        return make_options(of_earlier_run(self.run.settings), str(self.run.folder / "run.toml")) if self.run.settings else Options()
 
     @cached_property
     def body(self) -> Body:

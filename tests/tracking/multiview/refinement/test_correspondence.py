@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from benchmarks.speed import naive_multi as naive
 from shadowpuppet.body.shapes import Limbs
-from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.tracking.multiview.refinement.correspondence import (
     FAR,
     LANES,

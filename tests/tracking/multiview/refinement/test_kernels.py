@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scans import make_body, scan, some_pose
 
-from shadowpuppet.evaluation.bench import naive_multi as naive
+from benchmarks.speed import naive_multi as naive
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, make_cloud
 from shadowpuppet.tracking.multiview.refinement.refiner import Refiner
 from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scans import make_body, scan, some_pose
 
-from shadowpuppet.evaluation.bench import naive_multi as naive
+from benchmarks.speed import naive_multi as naive
 from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
 
 SURFACE = SurfaceSettings(epsilon=0.3, tau=0.06)

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from scans import make_body as random_tree
 from scans import scan, some_pose
 
+from benchmarks.speed import naive_multi as naive
 from shadowpuppet.body.jacobian import place_one
 from shadowpuppet.body.models import WHOLE, average_sizes
 from shadowpuppet.body.models import make_body as make_named
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.evaluation.bench import naive_multi as naive
 from shadowpuppet.geometry import rotation_about
 from shadowpuppet.tracking.multiview.refinement import gauss_newton
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
 
-from shadowpuppet.evaluation.bench import naive_mono
-from shadowpuppet.evaluation.bench.chain import WAVING, chain_figures, measure_chain, start_times
-from shadowpuppet.evaluation.bench.mono_cases import MonoCase, MonoFollower
-from shadowpuppet.evaluation.bench.opencv import OpenCV
-from shadowpuppet.evaluation.bench.silhouette_cases import SilhouetteCase
-from shadowpuppet.evaluation.bench.timing import Contender, Figures, Times, in_turns
-from shadowpuppet.pipeline.track import Listener
 from shadowpuppet.threads import one_opencv_thread
 from shadowpuppet.tracking.monocular.settings import make_settings
 
-ROUNDS, QUICK_ROUNDS = 41, 7
-FRAMES, QUICK_FRAMES = 3000, 120
-"""Frames of the film that is tracked."""
+from . import naive_mono
+from .chain import chain_figures, measure_chain, start_times
+from .extent import Extent
+from .mono_cases import MonoCase, MonoFollower
+from .opencv import OpenCV
+from .silhouette_cases import SilhouetteCase
+from .timing import Contender, Figures, Times, in_turns
+
 NAIVE_PARTICLES = 2
 """Particles a stage of the naive filter; its time is proportional to them, and scaled up to all of Table I."""
 FIGURES = Figures(
@@ -35,16 +34,16 @@ FIGURES = Figures(
 )  # fmt: skip
 
 
-def run_mono(quick: bool, listener: Listener) -> tuple[dict[str, Any], dict[str, Times]]:
+def run_mono(extent: Extent) -> tuple[dict[str, Any], dict[str, Times]]:
     """All `mono.*` figures by flat keys, and the times they come from. Raises `ShadowPuppetError` if a part of it fails."""
-    listener.begin("particles and frames, in turns")
+    print("... one camera: particles and frames, in turns", file=sys.stderr)
     with one_opencv_thread():
-        raw = in_turns(contenders(), QUICK_ROUNDS if quick else ROUNDS)
+        raw = in_turns(contenders(), extent.rounds)
     out: dict[str, Any] = FIGURES.of(raw)
-    listener.begin("a long film")
-    out |= chain_figures("mono", measure_chain(WAVING, QUICK_FRAMES if quick else FRAMES), "one_core")
-    if not quick:
-        listener.begin("compiling again")
+    print("... a long film", file=sys.stderr)
+    out |= chain_figures("mono", measure_chain(extent.waving, extent.frames), "one_core")
+    if extent.starts:
+        print("... compiling again", file=sys.stderr)
         out["mono.compile_s"], out["mono.start_s"] = start_times()
     return out, raw
 

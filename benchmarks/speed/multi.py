@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
-from shadowpuppet.evaluation.bench import naive_multi
-from shadowpuppet.evaluation.bench.chain import chain_figures, measure_chain, walking
-from shadowpuppet.evaluation.bench.multi_cases import MultiCase, MultiFollower
-from shadowpuppet.evaluation.bench.timing import Contender, Figures, Times, in_turns
 from shadowpuppet.geometry import Array
-from shadowpuppet.pipeline.track import Listener
 from shadowpuppet.tracking.multiview.settings import ForceSettings, make_multiview_settings
 
-ROUNDS, QUICK_ROUNDS = 21, 3
+from . import naive_multi
+from .chain import chain_figures, measure_chain
+from .extent import Extent
+from .multi_cases import MultiCase, MultiFollower
+from .timing import Contender, Figures, Times, in_turns
+
 FORCE_ITERATIONS, SOLVE_ITERATIONS = 20, 5
 """Iterations in a timed call."""
-FRAMES, QUICK_FRAMES = 300, 60
-"""Frames of the films that are tracked."""
 CORES = 2
 """Cores for the whole chain: films are decoded while the tracker works."""
 FIGURES = Figures(
@@ -28,14 +27,14 @@ FIGURES = Figures(
 )  # fmt: skip
 
 
-def run_multi(quick: bool, listener: Listener) -> tuple[dict[str, Any], dict[str, Times]]:
+def run_multi(extent: Extent) -> tuple[dict[str, Any], dict[str, Times]]:
     """All `multi.*` figures by flat keys, and the times they come from. Raises `ShadowPuppetError` if a part of it fails."""
-    listener.begin("several cameras, in turns")
-    case = MultiCase()
-    raw = in_turns(contenders(case), QUICK_ROUNDS if quick else ROUNDS)
+    print("... several cameras, in turns", file=sys.stderr)
+    case = extent.case
+    raw = in_turns(contenders(case), extent.rounds_multi)
     out: dict[str, Any] = FIGURES.of(raw) | {"multi.points": len(case.run_hull().points)}
-    listener.begin("seven films")
-    return out | chain_figures("multi", measure_chain(walking(), QUICK_FRAMES if quick else FRAMES, CORES), "cores"), raw
+    print("... several films", file=sys.stderr)
+    return out | chain_figures("multi", measure_chain(extent.walking, extent.frames_multi, CORES), "cores"), raw
 
 
 def contenders(case: MultiCase) -> dict[str, Contender]:

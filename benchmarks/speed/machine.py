@@ -1,25 +1,10 @@
-"""Properties of this machine that matter for speed."""
+"""Memory and cores of a process that is measured."""
 
 from __future__ import annotations
 
 import os
 import platform
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any
-
-PACKAGES = ("shadowpuppet", "numpy", "numba", "llvmlite", "opencv-python-headless", "av")
-LEVELS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX"), ("neon", "NEON"))
-
-
-def environment() -> dict[str, Any]:
-    """Processor, cores, vector instructions, system and versions."""
-    import llvmlite.binding as llvm
-
-    features = llvm.get_host_cpu_features()
-    level = next((name for feature, name in LEVELS if features.get(feature)), "none known")
-    return {"cpu": _model(), "llvm_cpu": llvm.get_host_cpu_name(), "cores": os.cpu_count(), "vectors": level, "system": platform.platform(),
-            "python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
 
 
 def resident_mb() -> float | None:
@@ -51,11 +36,3 @@ def use_cores(count: int = 1) -> str:
         os.sched_setaffinity(0, cores)
         return f"the process kept to {'one core' if len(cores) == 1 else f'{len(cores)} cores'}"
     return "one thread each for OpenCV, Numba and BLAS"
-
-
-def _model() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
-    except OSError:
-        return platform.processor() or "unknown"
-    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from vicon import c3d
 
+from papers.humaneva.__main__ import main
+from papers.humaneva.cal import read_cal
+from papers.humaneva.trials import PARTS, Sync, read_humaneva, read_sync, timing_of, write_humaneva
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.cli.app import run
 from shadowpuppet.errors import CalibrationError, FormatError, RecordingError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid, rotation_from_vector
-from shadowpuppet.io.humaneva import PARTS, Sync, read_cal, read_humaneva, read_sync, timing_of, write_humaneva
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.motion.metrics import GROUPS
@@ -160,17 +161,16 @@ def test_motion_capture_that_ends_too_soon_is_none(data):
 
 
 def test_the_command_makes_a_recording(data, tmp_path, capsys):
-    assert run(["humaneva", str(data), "--subject", "S2", "--action", "Box", "-o", str(tmp_path / "rec"), "--training-frames", "20"]) == 0
+    assert main([str(data), "--subject", "S2", "--action", "Box", "-o", str(tmp_path / "rec"), "--training-frames", "20"]) == 0
     shown = capsys.readouterr().out
     assert "3 cameras: C1, C2, BW1, 0.58 s" in shown
     assert "35 frames of 15 joints, 100 % known" in shown
-    assert "shadowpuppet track" in shown
     assert len(read_joints(tmp_path / "rec" / "training.csv").times) == 20
-    assert run(["humaneva", str(data), "--subject", "S2", "--action", "Box", "--part", "training", "-o", str(tmp_path / "rec")]) == 0
+    assert main([str(data), "--subject", "S2", "--action", "Box", "--part", "training", "-o", str(tmp_path / "rec")]) == 0
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "recording.toml").write_text("rate = 60")
     capsys.readouterr()
-    assert run(["humaneva", str(data), "--action", "Box", "-o", str(tmp_path / "other")]) == 2
+    assert main([str(data), "--action", "Box", "-o", str(tmp_path / "other")]) == 2
     assert "found something there that is no recording of HumanEva's" in capsys.readouterr().err
 
 

@@ -1,6 +1,6 @@
 """Measurements of the whole chain from film to poses, each in its own process: speed and memory on a long film, time to a first pose.
 
-`python -P -m shadowpuppet.evaluation.bench.chain track RECORDING RUN CORES` prints JSON; `... start` tracks one frame.
+As a program, `speed.chain track RECORDING RUN CORES` prints JSON, and `speed.chain start` tracks one frame.
 """
 
 from __future__ import annotations
@@ -28,9 +28,6 @@ from shadowpuppet.video import open_frames, write_frames
 WARM_UP = 0.2
 """Share of the film after which memory should not grow any more."""
 ONE_THREAD_EACH: dict[str, str] = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-WAVING = Spec(name="bench", motion=tuple(Gesture(motion=name, seconds=2.0) for name in ("wave_hands", "reach")),
-              scene=Scene(empty_seconds=1.0))  # fmt: skip
-"""Recording by one camera: a person waves and reaches."""
 
 
 def walking(size: tuple[int, int] = (640, 480), cameras: int = 7, frames: int = 12) -> Spec:
@@ -76,7 +73,7 @@ class _Memory(Listener):
         self.megabytes: list[float] = []
 
     def advance(self, frames: int) -> None:
-        from shadowpuppet.evaluation.bench.machine import resident_mb
+        from .machine import resident_mb
 
         self.megabytes.append(resident_mb() or np.nan)
 
@@ -84,7 +81,7 @@ class _Memory(Listener):
 def track_long(recording: str, run: str, cores: str) -> dict[str, Any]:
     """Track a recording with the default preset: frames/s, ms a frame by stage, peak memory and its growth (10^6 bytes), and how the
     process was held to `cores`."""
-    from shadowpuppet.evaluation.bench.machine import peak_mb, use_cores
+    from .machine import peak_mb, use_cores
 
     how, memory = use_cores(int(cores)), _Memory()
     metrics = track_recording(recording, run, make_options({"seed": 1}), memory).metrics
@@ -107,8 +104,8 @@ def _start(cache: str) -> float:
 
 def _child(failure: str, variables: Mapping[str, str], *arguments: str) -> str:
     """Standard output of this module as a program. Raises `ShadowPuppetError` with the last line of its errors."""
-    done = subprocess.run([sys.executable, "-P", "-m", "shadowpuppet.evaluation.bench.chain", *arguments], capture_output=True, text=True,
-                          encoding="utf-8", env=child_environment(variables))
+    done = subprocess.run([sys.executable, "-m", "speed.chain", *arguments], cwd=Path(__file__).resolve().parents[1], capture_output=True,
+                          text=True, encoding="utf-8", env=child_environment(variables))
     if done.returncode:
         raise ShadowPuppetError(f"bench: {failure}: {(done.stderr.strip().splitlines() or ['no reason'])[-1]}")
     return done.stdout
@@ -116,8 +113,8 @@ def _child(failure: str, variables: Mapping[str, str], *arguments: str) -> str:
 
 if __name__ == "__main__":
     if sys.argv[1] == "track":
-        print(json.dumps(track_long(*sys.argv[2:5])))  # noqa: T201 - for the process that started this one
+        print(json.dumps(track_long(*sys.argv[2:5])))
     else:
-        from shadowpuppet.evaluation.bench.mono_cases import MonoFollower
+        from .mono_cases import MonoFollower
 
         MonoFollower("default").run(1)

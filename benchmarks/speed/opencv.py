@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.evaluation.bench.mono_cases import MonoCase
 from shadowpuppet.geometry import Array
+
+from .mono_cases import MonoCase
 
 
 class OpenCV:

@@ -10,7 +10,7 @@ import numpy as np
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, warn
 from shadowpuppet.geometry import rigid
-from shadowpuppet.io.calibration.draft import Draft, Drafts, text_of
+from shadowpuppet.io.calibration.draft import Draft, text_of
 
 NUMBERS = 22
 """Count of numbers in a .cal file: fc 2, cc 2, alpha 1, kc 5, R 9, T 3."""
@@ -26,12 +26,6 @@ def read_cal(path: Path, name: str, size: tuple[int, int]) -> Camera:
         return Camera(name, size, np.array(draft.matrix), np.array(draft.distortion), rigid(draft.T[:3, :3], draft.T[:3, 3] / 1000))
     except CalibrationError as error:
         raise CalibrationError(f"{path}: {error}") from None
-
-
-def read_bouguet(path: Path) -> Drafts:
-    """Read a .cal file, or all those in a folder; cameras are named after the files. Raises `CalibrationError`."""
-    files = sorted(path.glob("*.cal")) if path.is_dir() else [path]
-    return Drafts(tuple(draft_of(file, file.stem) for file in files), "mm")
 
 
 def draft_of(path: Path, name: str, size: tuple[int, int] | None = None) -> Draft:

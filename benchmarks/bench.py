@@ -1,13 +1,29 @@
-"""The command `bench`: measures the speed on this machine."""
+"""How fast this machine is: particles and frames against OpenCV and plain NumPy, the whole chain, memory, start (docs/speed.md).
+
+    python -m benchmarks.bench [--json FIGURES.json]
+
+Some minutes; ends with tables. The file gets all figures by flat keys: `mono.*` with one camera, `multi.*` with several.
+"""
 
 from __future__ import annotations
 
+import argparse
+import json
+import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.cli.flags import Quiet, Switch
+sys.path.insert(0, str(Path(__file__).resolve().parent))  # as for a script of this folder
+
+import smallest
+from speed.extent import FULL, SMALLEST, Extent
+from speed.mono import run_mono
+from speed.multi import run_multi
+
+from shadowpuppet.cli.doctor import environment
 from shadowpuppet.cli.tables import pairs, show, table
+from shadowpuppet.threads import one_blas_thread
 
 # key of the time, name, factor to the unit, unit, and key of its ratio to the row above
 MONO_ROWS = (
@@ -37,30 +53,29 @@ MULTI_ROWS = (
 CHAIN = {"decode": "decoding", "segment": "segmentation", "track": "filter", "doubt": "doubt", "write": "writing"}
 
 
-def bench(*, json: Path | None = None, quick: Switch = False, quiet: Quiet = False) -> None:
-    """Measure the speed on this machine: particles and frames against OpenCV and plain NumPy, the whole chain, memory, start. Some minutes.
-
-    Parameters
-    ----------
-    json
-        File that gets all figures, by flat keys such as "mono.particle_us".
-    quick
-        Fewer rounds and a shorter film; compilation and start are not timed.
-    """
-    from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.evaluation.bench.run import check_writable, run_bench, write_figures
-
-    if json is not None:
-        check_writable(json)
-    with terminal(quiet) as listener:
-        found = run_bench(quick, listener)
-    if json is not None:
-        write_figures(json, found)
-    if not quiet:
-        show(*_tables(found))
+def main() -> None:
+    """Measure, write the figures, show the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, help="file that gets all figures")
+    arguments = smallest.parse(parser, lambda folder: ["--json", folder / "bench.json"])
+    if arguments.json is not None:
+        arguments.json.touch()  # fails now rather than after minutes of work
+    found = run_bench(SMALLEST if "--smallest" in sys.argv else FULL)
+    if arguments.json is not None:
+        arguments.json.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    show(*tables(found))
 
 
-def _tables(found: Mapping[str, Any]) -> Iterator[Any]:
+def run_bench(extent: Extent = FULL) -> dict[str, Any]:
+    """All figures by flat keys, with `environment` and `raw` (median and least seconds per unit, and rounds, of each timed function)."""
+    with one_blas_thread():
+        (mono, mono_raw), (multi, multi_raw) = run_mono(extent), run_multi(extent)
+    raw = {name: times._asdict() for name, times in (mono_raw | multi_raw).items()}
+    return {**mono, **multi, "environment": environment(), "raw": raw}
+
+
+def tables(found: Mapping[str, Any]) -> Iterator[Any]:
+    """The figures for the terminal."""
     for title, rows in (("one camera, 320 x 240", MONO_ROWS), ("seven cameras, 640 x 480", MULTI_ROWS)):
         cells = ((name, *(f"{scale * found['raw'][key][which]:.4g}" for which in ("median", "least")), unit,
                   f"{found[ratio]:.3g}" if ratio else "") for key, name, scale, unit, ratio in rows)  # fmt: skip
@@ -84,3 +99,7 @@ def _tables(found: Mapping[str, Any]) -> Iterator[Any]:
 
 def _megabytes(value: float | None) -> str:
     return "not known here" if value is None else f"{value:.1f} MB"
+
+
+if __name__ == "__main__":
+    main()

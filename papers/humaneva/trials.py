@@ -14,9 +14,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from papers.humaneva.cal import read_cal
 from shadowpuppet.errors import RecordingError, choices, warn
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.calibration.bouguet import read_cal
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import read_text, write_whole
 from shadowpuppet.io.motion.c3d import read_c3d
@@ -37,7 +37,7 @@ PARTS = {
 }
 """First trials of HumanEva-I: last frames of the validation part, which begins at `FIRST_VALID`, and of the training part, which follows it
 (the owners' partition, as in VideoPose3D). Ni 2008 tracks S2's validation frames: 433 of walking, 393 of jogging, 377 of boxing."""
-HEAD = "# A trial of HumanEva; made by `shadowpuppet humaneva`. The films stay where they are.\n"
+HEAD = "# A trial of HumanEva; made by `python -m papers.humaneva`. The films stay where they are.\n"
 """First line of recording.toml; marks folders that may be overwritten."""
 WRITTEN = ("recording.toml", "calibration.toml", "truth.csv", "training.csv")
 
