@@ -296,9 +296,10 @@ def test_a_page_that_others_can_see_is_said():
     display.server.server_close()
 
 
-def test_the_window_that_is_gone_names_its_successor():
-    with pytest.raises(SettingsError, match=r"show: found 'window', which is gone: --show browser shows the same on a page"):
-        open_display("window")
+@pytest.mark.parametrize(("show", "successor"), [("window", "the same on a page"), ("viewer", "the body in space too")])
+def test_what_is_gone_names_its_successor(show, successor):
+    with pytest.raises(SettingsError, match=f"show: found '{show}', which is gone: --show browser shows {successor}"):
+        open_display(show)
 
 
 def test_keys_of_the_page_are_commands(page):

@@ -236,7 +236,8 @@ class Session(LiveSession):
 
     def _shown(self, images: tuple[Image, ...], masks: tuple[Mask, ...], frame: MotionFrame | None) -> dict[str, Any]:
         picture = self.subject.picture if isinstance(self.subject, MonocularSubject) else None
-        return {"image": images[0] if images else None, "mask": masks[0] if masks else None, "picture": picture}
+        return {"image": images[0] if images else None, "mask": masks[0] if masks else None, "picture": picture,
+                "pictures": () if picture is None else (picture,)}
 
     def _message(self, masks: tuple[Mask, ...]) -> tuple[str, float | None]:
         if self.phase == "tracking":

@@ -1,10 +1,8 @@
-"use strict";
-
 const byId = (name) => document.getElementById(name);
 const SPAN = 20;                          // seconds of the sparkline
 const GROUPS = [["torso", "torso"], ["left", "left arm"], ["right", "right arm"]];
 const bars = new Map();
-let latencies = [], over = false;
+let latencies = [], over = false, space = null;
 
 function text(id, value) {
   const shown = value ?? "–";
@@ -85,6 +83,13 @@ function show(view) {
   text("footer", view.footer);
   if (view.angles.length) showAngles(view.angles);
   showLatencies(view);
+  if (view.space) showSpace(view);
+}
+
+// The body in space: its script is fetched when the person has been measured.
+async function showSpace(view) {
+  space ??= import("./space.js");
+  (await space).show(view);
 }
 
 function end() {
@@ -104,7 +109,7 @@ events.onmessage = (event) => {
 events.onerror = () => { if (!over) { byId("chip").textContent = "no connection"; byId("chip").className = "chip lost"; } };
 
 const send = (command) => fetch("command/" + command, {method: "POST", headers: {"X-Shadowpuppet": "1"}});
-for (const button of document.querySelectorAll("button")) button.onclick = () => send(button.dataset.command);
+for (const button of document.querySelectorAll("[data-command]")) button.onclick = () => send(button.dataset.command);
 
 const KEYS = {q: "stop", Escape: "stop", b: "learn", m: "measure"};
 document.addEventListener("keydown", (event) => {
