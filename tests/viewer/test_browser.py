@@ -26,7 +26,7 @@ from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
 playwright = pytest.importorskip("playwright.sync_api")
 
 FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-dev-shm-usage")
-PATIENCE = 30.0
+PATIENCE = 60.0
 """Seconds that a page may take: it is drawn by a processor that others use too."""
 ONLY_CANVAS = "body *:not(canvas):not(:has(canvas)) { visibility: hidden !important; }"
 

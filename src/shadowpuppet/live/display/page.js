@@ -1,6 +1,6 @@
 const byId = (name) => document.getElementById(name);
 const SPAN = 20;                          // seconds of the sparkline
-const GROUPS = [["torso", "torso"], ["left", "left arm"], ["right", "right arm"]];
+const GROUPS = ["torso", "left", "right", "body"];  // the last one: angles that begin with none of the others
 const bars = new Map();
 let latencies = [], over = false, space = null;
 
@@ -17,14 +17,16 @@ function element(kind, name, parent) {
 }
 
 function makeBars(angles) {
-  for (const [key, title] of GROUPS) {
-    const own = angles.filter(([name]) => name.startsWith(key));
+  const groupOf = (name) => GROUPS.find((key) => name.startsWith(key + " ")) ?? "body";
+  for (const key of GROUPS) {
+    const own = angles.filter(([name]) => groupOf(name) === key);
     if (!own.length) continue;
+    const title = key === "torso" || key === "body" ? key : key + (own.some(([name]) => /hip|knee|ankle/.test(name)) ? " side" : " arm");
     const group = element("div", key, byId("angles"));
     element("h2", "", group).textContent = title + ", degrees";
     for (const [name, , low, high] of own) {
       const row = element("div", "angle", group);
-      element("span", "", row).textContent = name.slice(key.length + 1);
+      element("span", "", row).textContent = key === "body" ? name : name.slice(key.length + 1);
       const bar = element("div", "bar", row), fill = element("i", "", bar), zero = element("u", "", bar);
       zero.style.left = 100 * -low / (high - low) + "%";
       bars.set(name, {fill, low, high, value: element("span", "value", row)});
