@@ -5,16 +5,18 @@ from __future__ import annotations
 import base64
 import http.client
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import people
 import pytest
 
-from shadowpuppet.geometry import inverse
+from shadowpuppet.geometry import inverse, rigid, rotation_about
 from shadowpuppet.live.display.view import View
 from shadowpuppet.motion.limbs import LIMBS
-from shadowpuppet.viewer.web.live import SpaceDisplay
+from shadowpuppet.viewer.web.frustum_images import Undistorter
+from shadowpuppet.viewer.web.live import WIDTH, SpaceDisplay
 
 ROOM = np.full((120, 160, 3), 90, np.uint8)
 
@@ -65,7 +67,8 @@ def test_the_space_begins_when_the_person_is_measured(page):
 
 
 def test_the_body_stands_in_space_where_the_camera_sees_it(page, rng):
-    picture = people.picture("rounded", elevation=-0.3)
+    camera = replace(people.camera(), T_camera_world=rigid(rotation_about([0, 1, 0], 0.7), [0.3, -0.2, 2.0]))
+    picture = replace(people.picture("rounded", elevation=-0.3), camera=camera)
     poses = people.random_poses(rng, picture.body.skeleton, 3)
     scene = page._space_of(tracked(picture)).content(tracked(picture))
     names = [name.replace(" ", "_") for name in scene["figures"][0]["jointNames"]]
@@ -96,10 +99,14 @@ def test_a_person_who_is_measured_again_gets_a_new_scene(page):
 
 def test_the_image_in_space_is_undistorted_with_the_outline_and_without_the_body(page):
     picture = people.picture("rounded", people.camera(lens="distorted"))
-    page.show(tracked(picture, image=np.repeat(np.repeat(ROOM, 2, 0), 2, 1)))
+    lined = ROOM.copy()
+    lined[:, ::20] = 255
+    page.show(tracked(picture, image=np.repeat(np.repeat(lined, 2, 0), 2, 1)))
     status, kind, body = ask(page, "/space.jpg?1")
     image = cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_COLOR)
     assert (status, kind, image.shape) == (200, "image/jpeg", (120, 160, 3))
+    straight, lens = (np.abs(image.astype(float) - shown).mean() for shown in (lined, Undistorter(picture.camera, WIDTH)(lined)))
+    assert lens < 0.7 * straight
     blue, _, red = image.astype(int).transpose(2, 0, 1)
     assert (blue - red > 20).sum() > 50, "the outline"
     assert (red - blue > 20).sum() == 0, "no body"
