@@ -73,10 +73,10 @@ def batch(folder: Path) -> None:
 
 
 def view(folder: Path) -> None:
-    """The viewer's library can be loaded."""
-    import viser
-
-    assert viser.ViserServer
+    """The viewer's page of a file is written; the extra installs nothing, and doctor names none."""
+    (folder / "in.csv").write_text("time,neck_x,neck_y,neck_z\n0.0,0.1,0.2,1.5\n0.1,0.1,0.25,1.5\n")
+    shadowpuppet("view", folder / "in.csv", "--html", folder / "page.html", "--quiet")
+    assert "<canvas" in (folder / "page.html").read_text("utf-8")
 
 
 CHECKS = {check.__name__: check for check in (formats, report, live, lsl, batch, view)}
@@ -86,6 +86,6 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as made:
         CHECKS[extra](Path(made))
     found = {finding["name"]: finding["state"] for finding in json.loads(shadowpuppet("doctor", "--json"))["findings"]}
-    if found[f"extra {extra}"] != "works" and extra != "lsl":
+    if found.get(f"extra {extra}", "works") != "works" and extra != "lsl":
         sys.exit(f"doctor says of the extra {extra}: {found[f'extra {extra}']}")
     print(f"extra {extra}: works")

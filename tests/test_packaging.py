@@ -20,7 +20,7 @@ from shadowpuppet.settings import settings_of
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "shadowpuppet"
-HEAVY = ("numpy", "scipy", "numba", "cv2", "av", "pydantic", "cyclopts", "rich", "matplotlib", "viser", "websockets", "pylsl",
+HEAVY = ("numpy", "scipy", "numba", "cv2", "av", "pydantic", "cyclopts", "rich", "matplotlib", "websockets", "pylsl",
          "distributed", "pyarrow", "asyncio")  # fmt: skip
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
@@ -127,14 +127,14 @@ def test_no_room_is_a_hall():
     assert {room: count for room, count in crowded.items() if count > MOST_FILES} == {}
 
 
-EXTRAS = {"distributed", "ezc3d", "matplotlib", "pyarrow", "pygltflib", "pylsl", "viser", "websockets"}
+EXTRAS = {"distributed", "ezc3d", "matplotlib", "pyarrow", "pygltflib", "pylsl", "websockets"}
 """Packages that no plain installation has."""
 
 
 def test_what_only_an_extra_installs_is_imported_where_it_is_used():
     found = []
     for path in PACKAGE.rglob("*.py"):
-        if "viewer" in path.parts or path.name == "websocket.py":
+        if path.name == "websocket.py":
             continue
         for node in ast.parse(path.read_text("utf-8")).body:
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []

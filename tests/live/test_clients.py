@@ -131,10 +131,10 @@ def test_the_ros_node_publishes_transforms_angles_and_a_stick_figure(who, frame,
     published.clear()
     with sending(Outlets([outlet]), who, frame):
         node.start()
-        end = time.monotonic() + 30
+        end = time.monotonic() + 60
         while not (published.get("person/joint_states") and len(published.get("person/markers", [])) > 4) and time.monotonic() < end:
             time.sleep(0.01)
-    node.join(10)
+    node.join(60)
     assert not node.is_alive()
     told = who.stream_frame(frame)
     transforms = published["/tf"][: (~doubted).sum()]

@@ -7,10 +7,10 @@ import http.client
 import json
 import shutil
 import socket
-import subprocess
 import threading
 import time
 
+import cv2
 import numpy as np
 import people
 import pytest
@@ -97,7 +97,7 @@ def page():
 
 
 def ask(display, path, method="GET", headers=None, read=True):
-    connection = http.client.HTTPConnection("127.0.0.1", display.server.server_port, timeout=20)
+    connection = http.client.HTTPConnection("127.0.0.1", display.server.server_port, timeout=60)
     connection.request(method, path, headers=headers or {})
     answer = connection.getresponse()
     return answer, answer.read() if read else b""
@@ -206,7 +206,7 @@ def test_names_that_were_turned_to_this_machine_are_refused(page, path):
 def test_two_hosts_are_refused(page):
     with socket.create_connection(page.server.server_address) as raw:
         raw.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nHost: evil.example\r\n\r\n")
-        raw.settimeout(5)
+        raw.settimeout(60)
         assert raw.recv(100).split(b"\r\n")[0].split()[1] == b"421"
 
 
@@ -222,9 +222,9 @@ def test_no_more_than_so_many_are_served_and_who_leaves_makes_room(monkeypatch):
     with WebDisplay(port=0) as page:
         address = ("127.0.0.1", page.server.server_port)
         with socket.create_connection(address), socket.create_connection(address), socket.create_connection(address) as third:
-            third.settimeout(10)
+            third.settimeout(60)
             assert third.recv(1) == b""
-        end = time.monotonic() + 10
+        end = time.monotonic() + 60
         while True:  # the first two are noticed to be gone
             with contextlib.suppress(OSError, http.client.HTTPException):
                 if ask(page, "/")[0].status == 200:
@@ -287,7 +287,7 @@ def test_half_a_request_is_ended_however_slowly_it_goes_on(monkeypatch, begun):
     with WebDisplay(port=0) as page, socket.create_connection(("127.0.0.1", page.server.server_port)) as slow:
         slow.settimeout(0.05)
         slow.sendall(begun)
-        end = time.monotonic() + 10
+        end = time.monotonic() + 60
         while True:
             assert time.monotonic() < end, "it is still being waited for"
             with contextlib.suppress(TimeoutError):
@@ -300,13 +300,13 @@ def test_half_a_request_is_ended_however_slowly_it_goes_on(monkeypatch, begun):
 
 
 def test_a_stream_goes_on_after_the_time_for_requests(monkeypatch):
-    monkeypatch.setattr(page_server, "REQUEST_SECONDS", 0.2)
+    monkeypatch.setattr(page_server, "REQUEST_SECONDS", 2.0)  # within which the request must have come on a loaded machine too
     with WebDisplay(port=0) as page:
         page.show(tracked())
         answer, _ = ask(page, "/events", read=False)
         told = events(answer)
         next(told)
-        time.sleep(0.4)
+        time.sleep(2.2)
         page.show(tracked(latency=0.02))
         assert any(view["latency"] == 20.0 for view in told)
 
@@ -356,12 +356,15 @@ def test_a_page_that_others_can_see_is_said():
     display.server.server_close()
 
 
-def test_the_window_that_is_gone_names_its_successor():
-    with pytest.raises(SettingsError, match=r"show: found 'window', which is gone: --show browser shows the same on a page"):
-        open_display("window")
+@pytest.mark.parametrize(("show", "successor"), [("window", "the same on a page"), ("viewer", "the body in space too")])
+def test_what_is_gone_names_its_successor(show, successor):
+    with pytest.raises(SettingsError, match=f"show: found '{show}', which is gone: --show browser shows {successor}"):
+        open_display(show)
 
 
-def test_keys_of_the_page_are_commands(page):
+@contextlib.contextmanager
+def browsed(page, complaints):
+    """The page in Chromium without a screen, and what its scripts complain of."""
     playwright = pytest.importorskip("playwright.sync_api")
     program = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
     if program is None:
@@ -371,13 +374,30 @@ def test_keys_of_the_page_are_commands(page):
             browser = tool.chromium.launch(executable_path=program, args=["--no-sandbox", "--disable-dev-shm-usage"])
         except playwright.Error as error:
             pytest.skip(f"Chromium cannot be run here: {str(error)[:200]}")
-        opened = browser.new_page()
-        opened.goto(page.address, wait_until="domcontentloaded")  # the stream of pictures never ends
-        for key, command in (("q", "stop"), ("Escape", "stop"), ("b", "learn"), ("m", "measure"), ("x", ""), ("Control+b", "")):
-            opened.keyboard.press(key)
-            opened.wait_for_timeout(500)
-            assert (page.command(), page.command()) == (command, ""), key
+        opened = browser.new_page(viewport={"width": 1280, "height": 760})
+        opened.on("console", lambda said: complaints.append(said.text))
+        opened.on("pageerror", lambda error: complaints.append(str(error)))
+        opened.goto(page.address, wait_until="domcontentloaded", timeout=60_000)  # the stream of pictures never ends
+        yield opened
         browser.close()
+
+
+def wait(opened, true, what):
+    """Wait for something to come true while the browser works."""
+    end = time.monotonic() + 60
+    while not true():
+        assert time.monotonic() < end, what
+        opened.wait_for_timeout(20)
+
+
+def test_keys_of_the_page_are_commands(page, monkeypatch):
+    pressed = list[str]()
+    monkeypatch.setattr(page, "press", pressed.append)
+    with browsed(page, []) as opened:
+        for key, count in (("q", 1), ("x", 1), ("Escape", 2), ("Control+b", 2), ("b", 3), ("m", 4)):
+            opened.keyboard.press(key)
+            wait(opened, lambda count=count: len(pressed) >= count, key)
+    assert pressed == ["stop", "stop", "learn", "measure"]
 
 
 def test_a_picture_is_drawn_once_for_all_pages_that_ask_at_once(page, monkeypatch):
@@ -397,38 +417,32 @@ def test_a_picture_is_drawn_once_for_all_pages_that_ask_at_once(page, monkeypatc
     assert (len(drawings), len(got), len(set(got))) == (1, 4, 1)
 
 
-def test_a_browser_shows_the_page(page, tmp_path):
-    """Chromium without a screen: the chip's and the skeleton's colours are in what it shows, and no script failed."""
-    browser = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
-    if browser is None:
-        pytest.skip("no Chromium here")
-    done = threading.Event()
-
-    def play():
-        while not done.wait(0.05):
-            page.show(tracked())
-
-    threading.Thread(target=play, daemon=True).start()
-    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1280,760", "--timeout=4000",
-               "--disable-dev-shm-usage",
-               "--enable-logging=stderr", f"--user-data-dir={tmp_path / 'profile'}", f"--screenshot={tmp_path / 'page.png'}", page.address]
-    try:
-        said = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False).stderr
-    finally:
-        done.set()
-        time.sleep(0.1)
-    if not (tmp_path / "page.png").exists():
-        pytest.skip(f"Chromium cannot be run here: {said.strip()[-200:]}")
-    assert not [line for line in said.splitlines() if "CONSOLE" in line]
-    shown = read_image(tmp_path / "page.png").astype(int)
-    assert shown.shape == (760, 1280, 3)
-
-    def near(x, y, colour):
-        part = np.abs(shown[y, x] - np.array(colour[::-1])).max(-1)
-        return int((part < 30).sum())
-
+def test_a_browser_shows_the_page(page):
+    """The chip's and the skeleton's colours are in what it shows, and no script complains."""
+    complaints = []
     right, left = (slice(880, 1270), slice(10, 750)), (slice(20, 860), slice(20, 740))
-    assert near(*right, (0x3F, 0xB6, 0x8B)) > 100  # the chip, and the left arm's bars
-    assert near(*right, (0xD0, 0x8C, 0xB8)) > 50  # the right arm's bars
-    assert near(*left, (0x56, 0xB4, 0xE9)) > 500  # the silhouette's outline
-    assert near(*left, (0xF0, 0xE4, 0x42)) > 100  # the spine
+    colours = [(right, (0x3F, 0xB6, 0x8B), 100), (right, (0xD0, 0x8C, 0xB8), 50),  # the chip and the left arm's bars; the right arm's
+               (left, (0x56, 0xB4, 0xE9), 500), (left, (0xF0, 0xE4, 0x42), 100)]  # the silhouette's outline; the spine
+    with browsed(page, complaints) as opened:
+
+        def shows():
+            page.show(tracked())
+            shown = cv2.imdecode(np.frombuffer(opened.screenshot(timeout=60_000), np.uint8), cv2.IMREAD_COLOR).astype(int)
+            assert shown.shape == (760, 1280, 3)
+            return all((np.abs(shown[y, x] - colour[::-1]).max(-1) < 30).sum() > least for (x, y), colour, least in colours)
+
+        wait(opened, shows, "all colours are seen")
+    assert complaints == []
+
+
+def test_angles_of_every_body_are_shown(page):
+    from shadowpuppet.body.models import average_sizes, make_body
+    from shadowpuppet.live.base_session import _angles
+
+    complaints, body = [], make_body("anatomical", average_sizes("anatomical", 1.75))
+    angles = _angles(body, np.zeros(len(body.skeleton.dofs)))
+    with browsed(page, complaints) as opened:
+        page.show(View(phase="tracking", status="tracked", image=ROOM, angles=angles, latency=0.012, interval=1 / 15))
+        wait(opened, lambda: opened.locator(".angle").count() == len(angles), "each has a bar")
+        wait(opened, lambda: opened.inner_text("#latency") == "12", "the latency is said")
+    assert complaints == []

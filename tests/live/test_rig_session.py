@@ -116,6 +116,7 @@ def test_a_camera_that_freezes_is_set_aside_by_name_and_taken_back():
         outcome = session.step(SnapshotSet(now[0], tuple(each[0] for each in scene), number=n))
         assert outcome.frame is not None
         messages.append(outcome.view.message)
+    assert list(outcome.view.pictures) == subject.pictures
     assert messages[4] == messages[-1] == ""
     assert messages[14] == f"set aside: {cameras[1].name} (frozen)"
 

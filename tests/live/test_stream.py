@@ -220,7 +220,7 @@ def test_an_address_of_version_six_is_sent_to():
             assert outlet.loopback
             outlet.begin(who)
             outlet.send(posed(who))
-            ear.settimeout(5)
+            ear.settimeout(60)
             assert ear.recv(65536).startswith(b"#bundle\0")
 
 
@@ -277,18 +277,18 @@ def test_a_program_gets_the_beginning_and_then_frames_and_is_reported_goodbye():
     with served() as (outlet, url), connect(url) as early:
         outlet.begin(who)
         outlet.send(posed(who))
-        assert [json.loads(early.recv(5))["type"] for _ in range(2)] == ["begin", "frame"]
+        assert [json.loads(early.recv(60))["type"] for _ in range(2)] == ["begin", "frame"]
         with connect(url) as late:
-            assert [json.loads(late.recv(5))["type"] for _ in range(2)] == ["begin", "frame"]  # what was newest when it came
+            assert [json.loads(late.recv(60))["type"] for _ in range(2)] == ["begin", "frame"]  # what was newest when it came
             outlet.send(who.stream_frame(MotionFrame(2.5, "lost")))
             for each in (early, late):
-                message = json.loads(each.recv(5))
+                message = json.loads(each.recv(60))
                 assert (message["time"], message["status"], message["joints"]) == (2.5, "lost", None)
         outlet.begin(subject("anatomical"))
-        assert json.loads(early.recv(5))["body"] == "anatomical"
+        assert json.loads(early.recv(60))["body"] == "anatomical"
         outlet.__exit__()
         with pytest.raises(ConnectionClosed) as closed:
-            early.recv(5)
+            early.recv(60)
         assert closed.value.rcvd is not None
         assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1001, "the session is over")
         assert outlet.counts() == {"served": 2, "refused": 0}
@@ -308,7 +308,7 @@ def test_pages_of_other_sites_may_not_listen(origins, origin, good):
         headers = {} if origin is None else {"Origin": origin}
         if good:
             with connect(url, additional_headers=headers) as connection:
-                assert json.loads(connection.recv(5))["type"] == "begin"
+                assert json.loads(connection.recv(60))["type"] == "begin"
         else:
             with pytest.raises(InvalidStatus) as refused:
                 connect(url, additional_headers=headers)
@@ -324,29 +324,31 @@ def test_a_name_that_another_site_turned_to_this_machine_and_two_hosts_are_refus
         with socket.create_connection(("127.0.0.1", outlet.port)) as raw:
             raw.sendall(f"GET / HTTP/1.1\r\n{named}Upgrade: websocket\r\nConnection: Upgrade\r\n"
                         "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode())
-            raw.settimeout(5)
+            raw.settimeout(60)
             assert raw.recv(100).startswith(b"HTTP/1.1 403")
         assert outlet.counts()["refused"] == 1
 
 
 def test_who_is_slow_gets_the_newest_frame_and_holds_nobody_up(monkeypatch):
     monkeypatch.setattr(websocket, "SEND_SECONDS", 600)
-    who, number = subject("anatomical"), 1500
+    who = subject("anatomical")
     told = posed(who)
     with served() as (outlet, url), raw_listener(outlet.port) as slow, connect(url) as quick:
         outlet.begin(who)
         seen = []
         reader = threading.Thread(target=lambda: seen.extend(json.loads(text).get("time") for text in quick), daemon=True)
         reader.start()
-        for n in range(1, number + 1):
-            outlet.send(told._replace(time=float(n)))
+        number, end = 0, time.monotonic() + 60
+        while number < 1500 or len(seen) <= 40:  # the quick one reads on while the slow one does not
+            assert time.monotonic() < end, "a client that reads is held up by one that does not"
+            number += 1
+            outlet.send(told._replace(time=float(number)))
             time.sleep(0.0005)
         received = drained(slow, lambda text: f'"time":{number}.0' in text)
         times = [float(found) for found in re.findall(r'"type":"frame","time":([0-9.]+)', received)]
         assert times[-1] == number  # the newest came, and at once after what had been on its way
         assert times == sorted(times)
         assert len(times) < number / 2
-        assert len(seen) > 40
 
 
 def test_who_reads_nothing_makes_room(monkeypatch):
@@ -385,7 +387,7 @@ def raw_listener(port: int):
         raw.connect(("127.0.0.1", port))
         raw.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
                     "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode())
-        raw.settimeout(5)
+        raw.settimeout(60)
         assert b"101" in raw.recv(20)
         yield raw
 
@@ -406,10 +408,10 @@ def test_rubbish_from_elsewhere_is_no_trouble(rubbish):
         with connect(url) as connection:
             connection.send("x" * 5000)  # longer than anything that anybody need say
             with pytest.raises(ConnectionClosed):
-                connection.recv(5)
+                connection.recv(60)
         with connect(url) as connection:
             outlet.begin(who)
-            assert json.loads(connection.recv(5))["type"] == "begin"
+            assert json.loads(connection.recv(60))["type"] == "begin"
 
 
 def test_no_more_than_so_many_listen_and_who_leaves_makes_room(monkeypatch):
@@ -417,7 +419,7 @@ def test_no_more_than_so_many_listen_and_who_leaves_makes_room(monkeypatch):
     with served() as (outlet, url), connect(url):
         with connect(url), pytest.raises(InvalidStatus):
             connect(url)
-        end = time.monotonic() + 10
+        end = time.monotonic() + 60
         while len(outlet._clients) > 1:
             assert time.monotonic() < end, "a client that left is still counted"
             time.sleep(0.01)
@@ -438,13 +440,13 @@ def test_the_lab_streaming_layer_carries_places_and_rotations(monkeypatch):
         outlets = open_outlets(OutletSettings(lsl=name))
     with outlets:
         outlets.begin(who)
-        found = pylsl.resolve_byprop("name", name, timeout=10)
+        found = pylsl.resolve_byprop("name", name, timeout=60)
         inlet = pylsl.StreamInlet(found[0])
-        inlet.open_stream(timeout=10)
+        inlet.open_stream(timeout=60)
         told, now = posed(who, torso_bow=0.3)._replace(age=0.25), pylsl.local_clock()
         outlets.send(told)
         outlets.send(who.stream_frame(MotionFrame(2.0, "lost")))
-        samples = [inlet.pull_sample(timeout=10) for _ in range(2)]
+        samples = [inlet.pull_sample(timeout=60) for _ in range(2)]
         channels, channel = [], inlet.info().desc().child("channels").child("channel")
         while not channel.empty():
             channels.append([channel.child_value(key) for key in ("label", "type", "unit")])

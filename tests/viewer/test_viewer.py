@@ -3,17 +3,10 @@
 from __future__ import annotations
 
 import base64
-import contextlib
-import gc
 import json
-import socket
-import subprocess
-import sys
-import threading
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from time import monotonic, sleep
 
 import cv2
 import made
@@ -50,7 +43,7 @@ from shadowpuppet.viewer.scene.of_run import side_by_side
 from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
 from shadowpuppet.viewer.scene.scene import Figure, Scene, SceneCamera
 from shadowpuppet.viewer.scene.strip import doubtful_moments, nearest_frames, strips_of
-from shadowpuppet.viewer.web.content import page_text
+from shadowpuppet.viewer.web.content import motion_content, page_text
 from shadowpuppet.viewer.web.frustum_images import Undistorter, camera_image
 from shadowpuppet.viewer.web.page import kept_frames, write_page
 from shadowpuppet.viewer.web.serve import ScenePage, serving
@@ -576,44 +569,13 @@ def test_what_the_page_asks_for_is_made(tracked, rig):
 
 @pytest.mark.parametrize("person", [True, False])
 def test_limbs_that_are_not_vouched_for_are_pale_in_their_frames(tmp_path, person):
-    pytest.importorskip("viser")
-    from shadowpuppet.viewer.web.scene_view import SceneView
-    from shadowpuppet.viewer.web.server import close_server, open_server
-
     doubtful = {2: {"left_arm": "uncertain"}, 3: {"left_arm": "predicted", "right_leg": "uncertain"}}
     scene = open_scene(make_run(tmp_path / "run", frames=5, person=person, doubtful=doubtful))
     (figure,) = scene.figures
     assert figure.doubtful is not None
+    told = unpacked(motion_content(figure, scene.times)["doubtful"]).reshape(5, -1)
+    assert [[LIMBS[k] for k in np.flatnonzero(frame)] for frame in told] == [list(doubtful.get(n, {})) for n in range(5)]
     assert [figure.doubtful.named(n) for n in range(5)] == [[], [], ["left arm"], ["left arm", "right leg"], []]
-    server = open_server(port=0)
-    try:
-        stage = SceneView(server, scene)
-        for n in (0, 3, 2, 4):
-            stage.figures[0].to(float(scene.times[n]), True)
-            for part in stage.figures[0].parts:
-                limb = LIMBS[part.limb]
-                pale = limb in doubtful.get(n, {})
-                assert part.solid.visible != pale
-                assert (part.pale is not None) == (limb in ("left_arm", "right_leg"))
-                assert part.pale is None or part.pale.visible == pale
-                at = (part.pale if pale else part.solid).bones[0].position
-                assert at == pytest.approx(figure.places[n, part.joints[0]], abs=1e-5)
-    finally:
-        close_server(server)
-
-
-def test_a_live_figure_is_pale_where_its_view_is(rng):
-    pytest.importorskip("viser")
-    from shadowpuppet.motion.mesh import body_mesh
-    from shadowpuppet.viewer.web.live import posed
-
-    body = body_of("anatomical")
-    pose = smooth_poses(body, 1, rng)[0]
-    every = [limb.replace("_", " ") for limb in LIMBS]
-    for doubtful, named in ((), []), (("left_elbow", "left_forearm"), ["left arm"]), (body.landmark_names, every):
-        figure = posed(body, BodyTree(body), body_mesh(body), pose, np.eye(4), frozenset(doubtful))
-        assert figure.doubtful is not None
-        assert figure.doubtful.named(0) == named
 
 
 def test_a_file_has_no_more_frames_than_are_seen():
@@ -640,163 +602,3 @@ def test_the_page_is_for_its_own_machine_and_itself(rig):
         refused.value.close()
         with pytest.raises(SettingsError, match="free port"), serving(scene, port=int(address.rstrip("/").rpartition(":")[2])):
             pass
-
-
-def test_live_pages_of_other_sites_and_names_are_refused():
-    pytest.importorskip("viser")
-    import urllib.error
-    import urllib.request
-
-    from websockets.exceptions import InvalidStatus
-    from websockets.sync.client import connect
-
-    from shadowpuppet.viewer.web.server import address_of, close_server, open_server
-
-    server = open_server(port=0)
-    try:
-        address, port = address_of(server), server.get_port()
-        assert address == f"http://127.0.0.1:{port}/"
-        with urllib.request.urlopen(address) as answer:
-            policy = answer.headers["Content-Security-Policy"]
-            assert (answer.status, "frame-ancestors 'none'" in policy, "http" in policy) == (200, True, False)
-        strange = urllib.request.Request(address, headers={"Host": "evil.example"})
-        with pytest.raises(urllib.error.HTTPError, match="403") as refused:
-            urllib.request.urlopen(strange)
-        refused.value.close()
-        protocol = _protocol()
-        socket = f"ws://127.0.0.1:{port}"
-        with connect(socket, subprotocols=[protocol], origin=f"http://127.0.0.1:{port}") as ours:
-            assert ours.recv(timeout=20)
-        for origin in ("http://evil.example", "null", f"http://127.0.0.1:{port + 1}"):
-            with pytest.raises(InvalidStatus, match="403"), connect(socket, subprotocols=[protocol], origin=origin):
-                pass
-        with pytest.raises(SettingsError, match="free port"):
-            open_server(port=port)
-        server.request_share_url()  # does nothing
-    finally:
-        close_server(server)
-
-
-def test_rubbish_prints_nothing_clients_are_counted_and_their_memory_comes_back(monkeypatch, capfd):
-    viser = pytest.importorskip("viser")
-    from websockets.exceptions import ConnectionClosed, InvalidStatus
-    from websockets.sync.client import connect
-
-    from shadowpuppet.viewer.web import server as module
-
-    monkeypatch.setattr(module, "MAX_CONNECTIONS", 3)
-    server = module.open_server(port=0)
-    try:
-        url, known = f"ws://127.0.0.1:{server.get_port()}", {"subprotocols": [_protocol()], "max_size": None}
-        capfd.readouterr()
-        for rubbish in (b"\xc1", b"\x81\xa4type\xa1x", "text", b"\xdd\xff\xff\xff\xff", b"\x90" * 500):
-            with contextlib.suppress(ConnectionClosed), connect(url, **known) as client:
-                client.send(rubbish)
-                for _ in range(100):
-                    client.recv(timeout=0.5)
-        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", server.get_port())) as raw:
-            raw.sendall(b"\x16\x03\x01" * 50)
-        with connect(url, **known), connect(url, **known), connect(url, **known), pytest.raises(InvalidStatus, match="503"):
-            connect(url, **known)
-        for _ in range(10):
-            with connect(url, **known) as client:
-                client.recv(timeout=5)
-        end = monotonic() + 10
-        while sum(issubclass(type(each), viser.ClientHandle) for each in gc.get_objects()) > 2:  # of a dead proxy only the type is known
-            assert monotonic() < end, "clients that left are still kept"
-            sleep(0.05)
-        assert capfd.readouterr() == ("", "")
-    finally:
-        module.close_server(server)
-
-
-def _protocol():
-    import viser
-    from websockets.typing import Subprotocol
-
-    return Subprotocol(f"viser-v{viser.__version__}")
-
-
-def test_a_library_that_cannot_be_guarded_is_not_used(monkeypatch):
-    pytest.importorskip("viser")
-    import websockets.asyncio.server as library
-
-    from shadowpuppet.viewer.web import server
-
-    plain = library.serve
-    with server.guarded(True) as installed:
-        assert library.serve is not plain
-        assert not installed()
-    assert library.serve is plain
-
-
-def test_servers_that_begin_at_once_are_guarded_one_after_another(monkeypatch):
-    pytest.importorskip("viser")
-    import time
-
-    import viser
-    import websockets.asyncio.server as library
-
-    from shadowpuppet.viewer.web.server import close_server, open_server
-
-    starting, together, guards = [], [], []
-
-    class Server:
-        def __init__(self, host: str, port: int, **_: object) -> None:
-            starting.append(self)
-            together.append(len(starting))
-            self.port = port
-            guards.append(library.serve)
-            library.serve(None)
-            time.sleep(0.05)
-            starting.remove(self)
-
-        def get_port(self) -> int:
-            return self.port
-
-        def stop(self) -> None: ...
-
-    def plain(*_: object, **__: object) -> None: ...
-
-    monkeypatch.setattr(library, "serve", plain)
-    monkeypatch.setattr(viser, "ViserServer", Server)
-    opened: list = []
-    threads = [threading.Thread(target=lambda: opened.append(open_server(port=0))) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    for server in opened:
-        close_server(server)
-    assert together == [1, 1, 1, 1]
-    assert len(opened) == len(set(map(id, guards))) == 4
-    assert plain not in guards
-    assert library.serve is plain
-
-
-def test_the_viewer_needs_no_extra_and_a_live_one_says_how_to_get_it(tmp_path):
-    run = make_run(tmp_path / "run", frames=3)
-    code = ("import sys; sys.modules['viser'] = None\n"
-            "import importlib.util as u; find = u.find_spec\n"
-            "u.find_spec = lambda name, *a: None if name == 'viser' else find(name, *a)\n"
-            f"from shadowpuppet.cli.app import run; code = run(['view', {str(run)!r}, '--quiet', '--html', {str(tmp_path / 'a.html')!r}])\n"
-            f"assert code == 0; sys.exit(run(['live', {str(tmp_path / 'none.mp4')!r}, '--show', 'viewer']))")  # fmt: skip
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == 2
-    assert "pip install 'shadowpuppet[view]'" in done.stderr
-
-
-def test_a_live_session_that_cannot_begin_leaves_no_words_of_the_library(tmp_path):
-    pytest.importorskip("viser")
-    command = [sys.executable, "-m", "shadowpuppet", "live", "--show", "viewer", "--port", "0", "--camera", str(tmp_path / "none.mp4"),
-               "--height", "1.7", "--fov", "60", "-o", str(tmp_path / "run")]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "none.mp4" in done.stderr
-
-
-def test_the_command_line_brings_no_viewer():
-    code = ("import sys, json; import shadowpuppet.cli.app; "
-            "print(json.dumps([name for name in ('viser', 'websockets') if name in sys.modules]))")
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True)
-    assert json.loads(done.stdout) == []

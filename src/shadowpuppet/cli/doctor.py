@@ -27,9 +27,9 @@ OLDEST_PYTHON = (3, 11)
 MODULES = {"opencv-python-headless": "cv2", "python-osc": "pythonosc"}
 """Import names of distributions, where they differ."""
 EXTRAS = {
-    "view": (("viser",), "`live --show viewer`"), "report": (("matplotlib",), "pages and plots about runs"),
-    "formats": (("pyarrow",), "Parquet"), "batch": (("distributed",), "many runs on a cluster"),
-    "live": (("websockets",), "live motion over a WebSocket"), "lsl": (("pylsl",), "live motion for the lab streaming layer"),
+    "report": (("matplotlib",), "pages and plots about runs"), "formats": (("pyarrow",), "Parquet"),
+    "batch": (("distributed",), "many runs on a cluster"), "live": (("websockets",), "live motion over a WebSocket"),
+    "lsl": (("pylsl",), "live motion for the lab streaming layer"),
 }  # fmt: skip
 """Modules of each extra, and its purpose."""
 CODECS = {"H.264": "h264", "HEVC": "hevc", "VP9": "vp9", "AV1": "av1", "MPEG-4": "mpeg4", "ProRes": "prores", "Motion JPEG": "mjpeg",

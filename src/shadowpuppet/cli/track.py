@@ -163,6 +163,7 @@ def live(camera: Annotated[str | None, Parameter(help="The camera, or a film to 
     from shadowpuppet.live.display.choice import open_display
     from shadowpuppet.live.run import run_live
     from shadowpuppet.live.stream.choice import open_outlets
+    from shadowpuppet.viewer.web.live import SpaceDisplay
 
     asked = given(settings)
     if camera is not None and asked.setdefault("camera", camera) != camera:
@@ -172,12 +173,7 @@ def live(camera: Annotated[str | None, Parameter(help="The camera, or a film to 
     _check_earlier(folder, force, resumes=False)
     with terminal(quiet, folder) as listener:
         opened = open_outlets(validate(OutletSettings, given(outlets), "flags"))
-        if chosen.show == "viewer":
-            from shadowpuppet.viewer.web.live import open_viewer
-
-            display = open_viewer(chosen.listen, chosen.port, chosen.record)
-        else:
-            display = open_display(chosen.show, chosen.listen, chosen.port, chosen.record)
+        display = open_display(chosen.show, chosen.listen, chosen.port, chosen.record, SpaceDisplay)
         metrics = run_live(folder, options, chosen, listener, display, outlets=opened)
     if metrics is None:
         say(f"nobody was tracked: nothing was written{_after_a_film(chosen.camera)}", error=True)

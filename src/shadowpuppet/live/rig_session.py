@@ -248,12 +248,14 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
         self._first.clear()
 
     def _shown(self, images: Images, masks: Masks, frame: MotionFrame | None) -> dict[str, Any]:
-        """The field image of a `View`: a grid of all cameras, drawn here because the display shows a single picture."""
+        """The fields image and pictures of a `View`. The image is a grid of all cameras, because the display shows a single picture."""
         if not images:
             return {}
-        pictures = self.subject.pictures if isinstance(self.subject, MultiviewSubject) else self._pictures
+        measured = self.subject.pictures if isinstance(self.subject, MultiviewSubject) else ()
         found = frame or MotionFrame(0.0, self.phase)
-        return {"image": overlay_grid(FrameSet(found.time, images, Seen(masks or (None,) * len(images))), found, pictures)}
+        seen = Seen(masks or (None,) * len(images))
+        grid = overlay_grid(FrameSet(found.time, images, seen), found, measured or self._pictures)
+        return {"image": grid, "pictures": tuple(measured)}
 
     def _aside(self) -> str:
         """Which cameras are left out or set aside, and why; empty if none is."""

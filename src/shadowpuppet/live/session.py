@@ -238,7 +238,8 @@ class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
 
     def _shown(self, images: Images, masks: Masks, frame: MotionFrame | None) -> dict[str, Any]:
         picture = self.subject.picture if isinstance(self.subject, MonocularSubject) else None
-        return {"image": only(images) if images else None, "mask": masks[0] if masks else None, "picture": picture}
+        return {"image": only(images) if images else None, "mask": masks[0] if masks else None, "picture": picture,
+                "pictures": () if picture is None else (picture,)}
 
     def _message(self, masks: Masks) -> tuple[str, float | None]:
         if self.phase == "tracking":

@@ -36,9 +36,9 @@ class LiveSettings:
     """Duration, in seconds, in which the empty scene is found: behind who moves, if there is a person."""
     still: Annotated[float, Field(ge=0.1, le=60)] = 1.0
     """Seconds after which a person who stands still is measured; one who moves is after three."""
-    show: Literal["auto", "browser", "viewer", "none", "window"] = "auto"
+    show: Literal["auto", "browser", "none", "window", "viewer"] = "auto"
     """Where the session is shown. browser: on a page, and its address is printed; auto: the same, and the page is opened if there is a
-    screen; viewer: the puppet in space, on the page of `shadowpuppet view`."""
+    screen."""
     listen: str = "127.0.0.1"
     """Address at which the page is served; any but the loopback address lets other machines see the person."""
     port: Annotated[int, Field(ge=0, le=65535)] | None = None

@@ -1,10 +1,8 @@
-"use strict";
-
 const byId = (name) => document.getElementById(name);
 const SPAN = 20;                          // seconds of the sparkline
-const GROUPS = [["torso", "torso"], ["left", "left arm"], ["right", "right arm"]];
+const GROUPS = ["torso", "left", "right", "body"];  // the last one: angles that begin with none of the others
 const bars = new Map();
-let latencies = [], over = false;
+let latencies = [], over = false, space = null;
 
 function text(id, value) {
   const shown = value ?? "–";
@@ -19,14 +17,16 @@ function element(kind, name, parent) {
 }
 
 function makeBars(angles) {
-  for (const [key, title] of GROUPS) {
-    const own = angles.filter(([name]) => name.startsWith(key));
+  const groupOf = (name) => GROUPS.find((key) => name.startsWith(key + " ")) ?? "body";
+  for (const key of GROUPS) {
+    const own = angles.filter(([name]) => groupOf(name) === key);
     if (!own.length) continue;
+    const title = key === "torso" || key === "body" ? key : key + (own.some(([name]) => /hip|knee|ankle/.test(name)) ? " side" : " arm");
     const group = element("div", key, byId("angles"));
     element("h2", "", group).textContent = title + ", degrees";
     for (const [name, , low, high] of own) {
       const row = element("div", "angle", group);
-      element("span", "", row).textContent = name.slice(key.length + 1);
+      element("span", "", row).textContent = key === "body" ? name : name.slice(key.length + 1);
       const bar = element("div", "bar", row), fill = element("i", "", bar), zero = element("u", "", bar);
       zero.style.left = 100 * -low / (high - low) + "%";
       bars.set(name, {fill, low, high, value: element("span", "value", row)});
@@ -85,6 +85,13 @@ function show(view) {
   text("footer", view.footer);
   if (view.angles.length) showAngles(view.angles);
   showLatencies(view);
+  if (view.space) showSpace(view);
+}
+
+// The body in space: its script is fetched when the person has been measured.
+async function showSpace(view) {
+  space ??= import("./space.js");
+  (await space).show(view);
 }
 
 function end() {
@@ -104,7 +111,7 @@ events.onmessage = (event) => {
 events.onerror = () => { if (!over) { byId("chip").textContent = "no connection"; byId("chip").className = "chip lost"; } };
 
 const send = (command) => fetch("command/" + command, {method: "POST", headers: {"X-Shadowpuppet": "1"}});
-for (const button of document.querySelectorAll("button")) button.onclick = () => send(button.dataset.command);
+for (const button of document.querySelectorAll("[data-command]")) button.onclick = () => send(button.dataset.command);
 
 const KEYS = {q: "stop", Escape: "stop", b: "learn", m: "measure"};
 document.addEventListener("keydown", (event) => {

@@ -61,7 +61,9 @@ class View:
     mask: NDArray[np.bool_] | None = None
     """The silhouette (H, W)."""
     picture: Picture | None = None
-    """The body as the camera sees it; None before it is known."""
+    """The body as the camera sees it; None before it is known, and for several cameras, whose bodies are drawn in `image` already."""
+    pictures: tuple[Picture, ...] = ()
+    """The body as each camera sees it, for drawing it in space; empty before it is known."""
     pose: NDArray[np.float64] | None = None
     """Degrees of freedom (D,); None without a trustworthy pose."""
     doubtful: frozenset[str] = frozenset()

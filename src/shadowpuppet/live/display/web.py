@@ -86,6 +86,14 @@ class WebDisplay(Display):
                 self._changed.wait(timeout)
             return self._number, self._view
 
+    def figures(self, view: View) -> dict[str, Any]:
+        """What the page is sent of a view, for JSON."""
+        return view.figures() | {"footer": self.footer}
+
+    def part(self, path: str) -> tuple[bytes, str] | None:
+        """What a subclass serves beside the page, at a path, and its content type; None if there is nothing."""
+        return None
+
     def picture(self, number: int, view: View) -> bytes:
         """A view's picture as JPEG, drawn once for all connections; empty without a picture."""
         with self._drawing:
@@ -122,6 +130,8 @@ class _Handler(PageHandler):
         elif path == "/events":
             self.begin("text/event-stream")
             self._follow(self._figures)
+        elif (found := self.server.display.part(path)) is not None:
+            self.answer(*found)
         else:
             self.refuse(HTTPStatus.NOT_FOUND, "no such page")
 
@@ -158,5 +168,4 @@ class _Handler(PageHandler):
         return head.encode() + data + f"\r\n--{BOUNDARY}\r\n".encode() if data else b""
 
     def _figures(self, number: int, view: View) -> bytes:
-        figures = view.figures() | {"footer": self.server.display.footer}
-        return f"data: {json.dumps(figures, allow_nan=False)}\n\n".encode()
+        return f"data: {json.dumps(self.server.display.figures(view), allow_nan=False)}\n\n".encode()

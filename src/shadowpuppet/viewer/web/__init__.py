@@ -1,1 +1,1 @@
-"""The viewer's page: server, timeline, panel, drawing with viser."""
+"""The viewer's page: as text, its scripts, its server, as one file; the body of a live session in space."""

@@ -40,13 +40,18 @@ def page_text(scene: Scene, cameras: Sequence[Undistorter], images: Sequence[Seq
         frames: indices of the frames that the page has; None: all.
     """
     every = np.arange(len(scene.times)) if frames is None else frames
-    data = json.dumps(_content(scene, cameras, images, pictures, every), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    script, style = "\n".join(map(_file, SCRIPTS)), _file("page.css")
+    data = json.dumps(content(scene, cameras, images, pictures, every), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    script, style = script_text(SCRIPTS), _file("page.css")
     server = "'self'" if images is None else ""
     policy = (f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; img-src data: {server}; "
               f"connect-src {server or NOTHING}; base-uri 'none'; form-action 'none'")  # fmt: skip
     parts = {"POLICY": policy, "TITLE": html.escape(scene.title), "STYLE": style, "DATA": data, "SCRIPT": script}
     return re.sub(r"@([A-Z]+)@", lambda found: parts[found[1]], _file("page.html"))  # in one pass: names in the parts may look like places
+
+
+def script_text(names: Sequence[str]) -> str:
+    """Scripts of the page, one after the other, as one."""
+    return "\n".join(map(_file, names))
 
 
 def _file(name: str) -> str:
@@ -57,8 +62,9 @@ def _hash(text: str) -> str:
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 
 
-def _content(scene: Scene, cameras: Sequence[Undistorter], images: Sequence[Sequence[str]] | None, pictures: bool,
-             frames: NDArray[np.int64]) -> dict[str, Any]:
+def content(scene: Scene, cameras: Sequence[Undistorter], images: Sequence[Sequence[str]] | None, pictures: bool,
+            frames: NDArray[np.int64]) -> dict[str, Any]:
+    """What the page's scripts draw, for JSON; arguments as of `page_text`."""
     times = scene.times[frames]
     low, high = scene.box
     return {
@@ -78,18 +84,10 @@ def _content(scene: Scene, cameras: Sequence[Undistorter], images: Sequence[Sequ
 
 def _figure(figure: Figure, times: Array) -> dict[str, Any]:
     """A figure at the page's frames: its mesh, and where its joints are in each of its own frames that is shown."""
-    shown = np.array([-1 if (n := figure.at(float(time))) is None else n for time in times])
-    used, index = np.unique(shown[shown >= 0], return_inverse=True)
-    at = np.full(len(times), -1)
-    at[shown >= 0] = index.ravel()
     mesh = figure.mesh
-    found = {
-        "name": figure.name, "kind": figure.kind, "shift": figure.shift, "frames": packed(at, "i4"), "count": len(used),
-        "joints": figure.places.shape[1], "turns": packed(32767 * np.roll(figure.quaternions[used], -1, axis=2), "i2"),
-        "places": packed(figure.places[used], "f4"), "jointNames": [name.replace("_", " ") for name in figure.joint_names],
-        "named": None if figure.joints is None else packed(figure.joints[used], "f4"), "bones": figure.bones,
-        "sd": None if figure.joint_sd is None or not np.isfinite(figure.joint_sd).any() else packed(figure.joint_sd[used], "f4"),
-        "doubtful": None if figure.doubtful is None else packed(figure.doubtful.frames[used], "u1"),
+    found = motion_content(figure, times) | {
+        "name": figure.name, "kind": figure.kind, "shift": figure.shift, "joints": figure.places.shape[1],
+        "jointNames": [name.replace("_", " ") for name in figure.joint_names], "bones": figure.bones,
         "limbs": 0 if figure.doubtful is None else figure.doubtful.frames.shape[1],
     }  # fmt: skip
     if figure.kind == "truth" and figure.joints is not None and figure.bones:
@@ -99,6 +97,20 @@ def _figure(figure: Figure, times: Array) -> dict[str, Any]:
         "points": packed(mesh.points - figure.rest[mesh.joints], "f4"), "normals": packed(mesh.normals, "f4"),
         "triangles": packed(mesh.triangles, "u4"), "colours": packed(mesh_colours(figure), "u1"),
         "joints": packed(mesh.joints, "f4"), "limbs": packed(limbs, "f4")}}  # fmt: skip
+
+
+def motion_content(figure: Figure, times: Array) -> dict[str, Any]:
+    """What `Stage.move` takes: the figure's own frame at each of the times (s), -1 for none, and the joints in these frames, for JSON."""
+    shown = np.array([-1 if (n := figure.at(float(time))) is None else n for time in times])
+    used, index = np.unique(shown[shown >= 0], return_inverse=True)
+    at = np.full(len(times), -1)
+    at[shown >= 0] = index.ravel()
+    return {
+        "frames": packed(at, "i4"), "count": len(used), "turns": packed(32767 * np.roll(figure.quaternions[used], -1, axis=2), "i2"),
+        "places": packed(figure.places[used], "f4"), "named": None if figure.joints is None else packed(figure.joints[used], "f4"),
+        "sd": None if figure.joint_sd is None or not np.isfinite(figure.joint_sd).any() else packed(figure.joint_sd[used], "f4"),
+        "doubtful": None if figure.doubtful is None else packed(figure.doubtful.frames[used], "u1"),
+    }  # fmt: skip
 
 
 def _camera(each: SceneCamera, lens: Undistorter, n: int) -> dict[str, Any]:

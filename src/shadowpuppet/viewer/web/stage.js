@@ -141,7 +141,7 @@ class Stage {
 
   figure(each) {
     const gl = this.gl, made = {...each};
-    for (const name of ["frames", "turns", "places", "named", "sd", "doubtful"]) made[name] = each[name] ? unpack(each[name]) : null;
+    this.move(made, each);
     if (each.mesh) {
       const mesh = Object.fromEntries(Object.entries(each.mesh).map(([name, values]) => [name, unpack(values)]));
       made.array = gl.createVertexArray();
@@ -158,6 +158,11 @@ class Stage {
       made.texture = this.texture(gl.NEAREST);
     }
     return made;
+  }
+  // A figure's frames, from `content.motion_content`.
+  move(figure, each) {
+    for (const name of ["frames", "turns", "places", "named", "sd", "doubtful"]) figure[name] = each[name] ? unpack(each[name]) : null;
+    this.stale = true;
   }
   camera(each) {
     const R = each.pose, centre = [R[0][3], R[1][3], R[2][3]];
