@@ -17,7 +17,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError
+from shadowpuppet.errors import FormatError, ShadowPuppetError, VideoError
+from shadowpuppet.io.files.lock import LOCK
+from shadowpuppet.io.inputs.inputs import Resuming, inputs_of
 from shadowpuppet.io.intervals import IntervalWriter, read_intervals
 from shadowpuppet.io.motion.table import read_joints, read_raw
 from shadowpuppet.io.run import read_run
@@ -263,6 +265,183 @@ def test_a_lock_ends_with_its_process(tmp_path):
     assert (folder / ".lock").exists()
     write(folder)
     assert read_run(folder).complete
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+
+
+def another_run(folder: Path) -> None:
+    """What someone does who removes a lock by hand, and forces another run into the folder."""
+    (folder / LOCK).unlink()
+    write(folder, ["lost", "tracked"])
+    (folder / "person.toml").write_text("of the other run")
+
+
+def no_lock(folder: Path) -> None:
+    (folder / LOCK).unlink()
+
+
+def another_lock(folder: Path) -> None:
+    (folder / LOCK).replace(folder / "kept")
+    shutil.copy(folder / "kept", folder / LOCK)
+
+
+def renamed(folder: Path) -> None:
+    folder.rename(folder.with_name("away"))
+
+
+def removed(folder: Path) -> None:
+    shutil.rmtree(folder)
+
+
+def exchanged(folder: Path) -> None:
+    renamed(folder)
+    write(folder, ["lost", "tracked"])
+
+
+def exchanged_by_a_copy(folder: Path) -> None:
+    shutil.copytree(folder, folder.with_name("copy"))
+    renamed(folder)
+    folder.with_name("copy").rename(folder)
+
+
+LOST = {another_run: r"\.lock, which keeps others out, was removed while the run went on, so that another one may have written here",
+        no_lock: r"\.lock, which keeps others out, was removed", another_lock: r"\.lock, which keeps others out, was removed",
+        renamed: "the folder was removed or renamed while the run went on", removed: "the folder was removed or renamed",
+        exchanged: "another folder was put in the place of that in which the run went on",
+        exchanged_by_a_copy: "another folder was put in the place"}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows removes and renames nothing that is open")
+@pytest.mark.parametrize("when", ["before the first frame", "before another frame", "at the end", "after an error"])
+@pytest.mark.parametrize("lose", LOST, ids=lambda lose: lose.__name__)
+def test_a_run_whose_folder_or_lock_is_taken_away_says_so_and_writes_nothing_more(tmp_path, lose, when):
+    folder, after = tmp_path / "run", []
+
+    def run() -> None:
+        with writer(folder) as run:
+            for n in range(0 if when == "before the first frame" else 3):
+                run.write(a_frame(n))
+            lose(folder)
+            after.append(contents(folder) if folder.exists() else None)
+            if when == "after an error":
+                raise ShadowPuppetError("no silhouette")
+            if when != "at the end":
+                run.write(a_frame(3))
+
+    with pytest.raises(ShadowPuppetError, match=f"{LOST[lose]}.*; the run ends here, is not complete, and writes nothing more"):
+        run()
+    assert after == [contents(folder) if folder.exists() else None]
+    if lose in (another_run, exchanged):
+        found = read_run(folder)
+        assert found.complete
+        assert found.motion.status.tolist() == ["lost", "tracked"]
+    if lose in (renamed, exchanged, exchanged_by_a_copy):
+        assert not tomllib.loads((tmp_path / "away" / "run.toml").read_text())["complete"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows removes nothing that is open")
+def test_a_run_that_was_forced_into_a_folder_keeps_its_lock_when_the_other_ends(tmp_path):
+    folder = tmp_path / "run"
+    first, second = writer(folder), writer(folder)
+    first.__enter__()
+    first.write(a_frame(0))
+    (folder / LOCK).unlink()
+    with second:
+        second.write(a_frame(1))
+        with pytest.raises(ShadowPuppetError, match="was removed while the run went on"):
+            first.__exit__(None)
+        with pytest.raises(ShadowPuppetError, match="found another run at work in it"):
+            writer(folder).__enter__()
+        second.write(a_frame(2))
+    assert read_run(folder).complete
+    assert len(read_run(folder).motion) == 2
+
+
+def resumable(folder: Path, film: Path, goes_on: bool = False) -> RunWriter:
+    return RunWriter(folder, "cardbox", DOFS, JOINTS, INFO, Resuming(goes_on, inputs_of(film, {})))
+
+
+@pytest.fixture
+def film(tmp_path) -> Path:
+    (tmp_path / "film.mp4").write_text("film")
+    return tmp_path / "film.mp4"
+
+
+def test_a_run_is_not_complete_if_an_input_changes_while_it_goes_on(tmp_path, film):
+    folder = tmp_path / "run"
+
+    def work() -> None:
+        with resumable(folder, film) as run:
+            for n in range(3):
+                run.write(a_frame(n))
+            film.write_text("another film")
+
+    with pytest.raises(ShadowPuppetError, match=r"run: film\.mp4 has changed while the run went on: it is not complete"):
+        work()
+    found = read_run(folder)
+    assert not found.complete
+    assert not found.metrics["complete"]
+    assert len(found.motion) == 3
+
+
+def test_no_checkpoint_is_of_two_recordings(tmp_path, film):
+    folder = tmp_path / "run"
+
+    def work() -> None:
+        with resumable(folder, film) as run:
+            for n, text in enumerate(("film", "another film")):
+                run.write(a_frame(n))
+                if n:
+                    film.write_text(text)
+                run.checkpoint((n,))
+
+    with pytest.raises(ShadowPuppetError, match=r"film\.mp4 has changed while the run went on"):
+        work()
+    with pytest.raises(ShadowPuppetError, match=r"the run there cannot go on: film\.mp4 has changed since"), \
+            resumable(folder, film, goes_on=True):
+        pass
+    film.write_text("film")
+    with resumable(folder, film, goes_on=True) as run:
+        state, frames = run.resumed(())
+        assert (state, len(frames)) == ((0,), 1)
+        run.write(a_frame(1))
+    assert read_run(folder).complete
+    assert not {"checkpoint.npz", "checkpoint.frames", "checkpoint.json"} & contents(folder).keys()
+
+
+def test_a_film_that_cannot_be_read_because_it_changed_is_said_to_have_changed(tmp_path, film):
+    def work() -> None:
+        with resumable(tmp_path / "run", film) as run:
+            run.write(a_frame(0))
+            film.write_text("")
+            raise VideoError("film.mp4: no film")
+
+    with pytest.raises(ShadowPuppetError, match=r"film\.mp4 has changed while the run went on"):
+        work()
+
+
+def test_a_checkpoint_of_a_version_that_kept_no_inputs_is_refused(tmp_path, film):
+    folder = tmp_path / "run"
+
+    def work() -> None:
+        with resumable(folder, film) as run:
+            run.write(a_frame(0))
+            run.checkpoint((1,))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    (folder / "checkpoint.json").unlink()
+    before = contents(folder)
+    with pytest.raises(FormatError, match=r"found a checkpoint without checkpoint\.json, as earlier versions wrote it.*--force"), \
+            resumable(folder, film, goes_on=True):
+        pass
+    assert contents(folder) == before
+    (folder / "checkpoint.npz").unlink()
+    with resumable(folder, film, goes_on=True) as run:  # it begins at the start
+        assert run.resumed(()) is None
 
 
 def test_a_folder_is_never_a_mixture_of_two_runs(tmp_path, monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -70,8 +71,11 @@ def film(request, recording, tmp_path_factory):
     subject = replace(kind.fit(np.random.default_rng(1), survey, options), beside=())
     known = kind._replace(survey=lambda *_, **__: survey, fit=lambda *_: subject)
 
-    def track(folder, listener=None, resume=False, **changed):
-        return run(rig, known, folder, replace(options, **changed), listener or Listener(), resume=resume)
+    def track(folder, listener=None, resume=False, place=None, **changed):
+        seen = rig if place is None else replace(open_rig(place, options), footage=rig.footage)
+        return run(seen, known, folder, replace(options, **changed), listener or Listener(), resume=resume)
+
+    track.recording = rig.recording.path
 
     return track
 
@@ -122,6 +126,12 @@ def test_only_the_same_run_goes_on_and_a_complete_one_does_not(film, tmp_path, m
         film(left, resume=True, seed=4)
     with pytest.raises(ShadowPuppetError, match=r"settings\.end was not given, and is '1'"):
         film(left, resume=True, end="1")
+    for name, said in (("calibration.toml", r"calibration\.toml"), ("video", r"video/\w+\.\w+")):
+        other = made.copied(film.recording, tmp_path / name)
+        one = other / name if name != "video" else sorted((other / name).iterdir())[0]
+        one.write_bytes(one.read_bytes() + b"\n")
+        with pytest.raises(ShadowPuppetError, match=f"the run there cannot go on: {said} has changed since; expected the files with which"):
+            film(left, resume=True, place=other)
     look, changed = module.json_text, "{}"
     monkeypatch.setattr(module, "json_text", lambda value: changed)
     with pytest.raises(ShadowPuppetError, match=r"its look\.json differs from what the recording gives now"):
@@ -141,6 +151,12 @@ def test_only_the_same_run_goes_on_and_a_complete_one_does_not(film, tmp_path, m
     (left / "raw.csv").write_text("")
     film(left, resume=True)
     assert_equal_runs(left, folder)
+    shutil.rmtree(left)
+    shutil.copytree(copy, left)
+    found = film(left, resume=True, place=made.copied(film.recording, tmp_path / "elsewhere"))  # a copy holds the same
+    assert (left / "motion.npz").read_bytes() == (folder / "motion.npz").read_bytes()
+    assert tomllib.loads((left / "run.toml").read_text())["recording"] == str((tmp_path / "elsewhere").resolve())
+    assert found.metrics["complete"]
     shutil.rmtree(left)
     shutil.copytree(copy, left)
     (left / STATE).unlink()  # killed before the first checkpoint: it begins at the start

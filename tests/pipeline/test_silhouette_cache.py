@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import made
 import numpy as np
 import pytest
@@ -54,6 +56,21 @@ def test_an_overlay_has_the_films_pictures(track, tmp_path):
     plain = track()[0]
     assert track(cache, overlay=True) == (plain, False)
     assert len(made.images(tmp_path / "run" / "overlay.mp4")) == made.FRAMES
+
+
+def test_a_film_that_was_replaced_between_two_runs_is_surveyed_again(spoilt):
+    cache, made_of = SilhouetteCache(), []
+
+    def survey(**values) -> None:
+        cache.survey(open_rig(spoilt, make_options(values)), make_options(values), lambda rig, _: made_of.append(rig) or rig)
+
+    survey()
+    survey()
+    assert len(made_of) == 1
+    (film,) = (path for path in (spoilt / "video").iterdir())
+    os.utime(film, (1, 1))
+    survey()
+    assert len(made_of) == 2
 
 
 def test_a_run_that_broke_off_leaves_nothing_to_keep(track):

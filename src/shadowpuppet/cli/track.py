@@ -132,7 +132,7 @@ def _check_earlier(folder: Path, force: bool, resumes: bool = True) -> None:
 
     `resumes`: whether the command can go on with a run that was broken off.
     """
-    from shadowpuppet.io.run_writer import earlier_run
+    from shadowpuppet.io.inputs.earlier_run import earlier_run
 
     earlier = None if force else earlier_run(folder)
     if earlier is None:

@@ -11,25 +11,28 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
-from shadowpuppet.errors import FormatError, ShadowPuppetError, reason, shown
+from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
 from shadowpuppet.io import checkpoint
 from shadowpuppet.io.angle_conventions import write_angles
 from shadowpuppet.io.contacts import write_contacts
-from shadowpuppet.io.files.lock import LOCK, locked
+from shadowpuppet.io.files.lock import LOCK, Lock, locked
 from shadowpuppet.io.files.plain import for_json, for_toml, plain
-from shadowpuppet.io.files.table import csv_line, shorten
+from shadowpuppet.io.files.table import csv_line
 from shadowpuppet.io.files.text import read_toml, write_whole
+from shadowpuppet.io.inputs.earlier_run import check_folder, unmark
+from shadowpuppet.io.inputs.inputs import Resuming
+from shadowpuppet.io.inputs.same_run import INPUTS, check_same, write_inputs
 from shadowpuppet.io.intervals import IntervalWriter
 from shadowpuppet.io.motion.npz import write_motion_npz
 from shadowpuppet.io.motion.table import run_headers, run_rows, write_raw
-from shadowpuppet.io.people import PEOPLE, person_folders, remove_people
+from shadowpuppet.io.people import person_folders, remove_people
 from shadowpuppet.io.run import ANGLES, CONTACTS, RAW, TABLES
 from shadowpuppet.motion.contact.contact import contacts_of
 from shadowpuppet.motion.motion import Mode, Motion, MotionBuilder, MotionFrame
 
-MADE = (RAW, CONTACTS, ANGLES, "motion.npz", "metrics.json", "overlay.mp4")
+MADE = (RAW, CONTACTS, ANGLES, "motion.npz", "metrics.json", "overlay.mp4", "overlay.part.mp4")
 """Files written at the end of a run."""
-FILES = (checkpoint.STATE, *MADE, *TABLES, checkpoint.FRAMES, "look.json", "person.toml", "calibration.toml")
+FILES = (checkpoint.STATE, INPUTS, *MADE, *TABLES, checkpoint.FRAMES, "look.json", "person.toml", "calibration.toml")
 """Files of an earlier run that a new one in its folder replaces or removes. run.toml, which marks a run's folder, always stays."""
 OWN_KEYS = ("complete", "frames", "body", "versions")
 """Keys of run.toml that the writer sets."""
@@ -44,14 +47,15 @@ class RunWriter:
 
     The folder must be new, empty or that of an earlier run, which is replaced by `begin`, at the latest when the first frame is written.
     Raises `ShadowPuppetError` for any other folder, for one in which another run is being written, and if it cannot be written; frames
-    written before stay readable.
+    written before stay readable. It also does so, and the run is not complete, if the folder or its lock is taken away while the run goes
+    on, or if one of its inputs changes.
     """
 
     def __init__(self, folder: str | Path, body_name: str, dof_names: Sequence[str], joint_names: Sequence[str],
-                 info: Mapping[str, Any], resume: bool | None = None, of_group: bool = False) -> None:
+                 info: Mapping[str, Any], resume: Resuming | None = None, of_group: bool = False) -> None:
         """`info`: entries of run.toml; dataclasses, arrays and paths are converted, values of None are left out. `resume`: whether an
-        earlier run of the same `info` goes on from its checkpoint; None: no checkpoints are kept. `of_group`: whether it is that of one of
-        several people, who have one checkpoint together."""
+        earlier run of the same `info` and inputs goes on from its checkpoint; None: no checkpoints are kept. `of_group`: whether it is that
+        of one of several people, who have one checkpoint together."""
         taken = set(info) & set(OWN_KEYS)
         if taken:
             raise ShadowPuppetError(f"info: found {min(taken)!r}, which the run's writer fills in itself")
@@ -63,6 +67,7 @@ class RunWriter:
         """Other places of limbs, by time: a motion does not keep them."""
         self._tables: Sequence[BinaryIO] = ()
         self._resume, self._earlier, self._stack = resume, False, contextlib.ExitStack()
+        self._lock: Lock
         self._before: list[MotionFrame] | None = None
         self._people, self._of_group = False, of_group
 
@@ -71,36 +76,67 @@ class RunWriter:
         with contextlib.ExitStack() as stack:
             with self._system_errors():
                 self.folder.mkdir(parents=True, exist_ok=True)
-                stack.enter_context(locked(self.folder, "run"))
-                self._earlier = _check_folder(self.folder)
+                self._lock = stack.enter_context(locked(self.folder, "run"))
+                self._earlier = check_folder(self.folder)
                 probe = self.folder / "run.toml.part"  # fail now rather than after hours of tracking
                 probe.touch()
                 probe.unlink()
             if not self._earlier:
                 self._write_info(complete=False)  # marks the folder as a run's before callers add files to it
-            elif self._resume and not self._of_group:
-                self._check_same(read_toml(self.folder / "run.toml", FormatError))
+            elif self._goes_on and not self._of_group:
+                self._check_same(self._goes_on, read_toml(self.folder / "run.toml", FormatError))
             self._stack = stack.pop_all()
         return self
 
+    @property
+    def _goes_on(self) -> Resuming | None:
+        """How an earlier run in the folder goes on; None if the run begins at the start."""
+        return self._resume if self._resume is not None and self._resume.goes_on and self._earlier else None
+
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Write the remaining files, after an error as far as possible."""
+        """Write the remaining files, after an error as far as possible. Raises `ShadowPuppetError` as `check` does."""
+        trouble: ShadowPuppetError | None = None
         with self._stack:
-            if self._people:
-                self._write_info(complete=kind is None)
-                if kind is None:
-                    self._remove_checkpoints(self.folder, *person_folders(self.folder).values())
-            elif kind is None:
-                self.begin()
-                self._finish(complete=True)
-            elif self._tables:
-                with contextlib.suppress(ShadowPuppetError):
-                    self._finish(complete=False)
-            else:
-                self._leave()
-        if not self._tables and not self._earlier and not self._people:
+            try:
+                self.check()
+            except ShadowPuppetError as error:
+                trouble = error
+            if is_ours := self._lock.is_ours:
+                self._end(complete=kind is None and trouble is None)
+            self._close()
+        if is_ours and not self._tables and not self._earlier and not self._people:
             with contextlib.suppress(OSError):  # others put files into it
                 self.folder.rmdir()
+        if trouble is not None and (kind is None or issubclass(kind, ShadowPuppetError)):
+            raise trouble  # a film that changes may be why it could not be read
+
+    def check(self) -> None:
+        """Raise `ShadowPuppetError` if the folder is not this run's any more, or if one of its inputs differs from what it was when the run
+        began: in size or time of change."""
+        self._lock.check()
+        if changed := "" if self._resume is None else self._resume.inputs.changed():
+            raise ShadowPuppetError(f"{self.folder}: {changed} while the run went on: it is not complete, as its frames would be of two "
+                                    "recordings; track it again with --force")
+
+    def _end(self, complete: bool) -> None:
+        """Write the remaining files."""
+        if self._people:
+            self._write_info(complete)
+            if complete:
+                self._remove_checkpoints(self.folder, *person_folders(self.folder).values())
+        elif complete:
+            self.begin()
+            self._finish(complete=True)
+        elif self._tables:
+            with contextlib.suppress(ShadowPuppetError):
+                self._finish(complete=False)
+        else:
+            self._leave()
+
+    def _close(self) -> None:
+        for table in self._tables:
+            with contextlib.suppress(OSError):
+                table.close()
 
     def _leave(self) -> None:
         """Remove the mark of a run without frames, unless callers put files into the folder."""
@@ -112,24 +148,25 @@ class RunWriter:
         """Make the folder that of several people: only run.toml is written in it, with `people`; their runs go into folders of their own
         (`io.people`). Returns the state of the last `checkpoint` of an earlier run that goes on; else that is removed, and there is none.
         `types`: as in `resumed`."""
-        found = checkpoint.read_checkpoint(self.folder, types) if self._resume and self._earlier else None
+        found = checkpoint.read_checkpoint(self.folder, types) if self._goes_on else None
         self._people = True
         self.info["people"] = 0
         if found is not None:
             return found.state
         if self._earlier:
-            _unmark(self.folder)
+            unmark(self.folder)
             remove_people(self.folder, (*FILES, "run.toml"))
         with self._system_errors():
             for name in FILES:
                 (self.folder / name).unlink(missing_ok=True)
         self._write_info(complete=False)
+        self._keep_inputs()
         return None
 
     def resumed(self, types: Iterable[type]) -> tuple[Any, list[MotionFrame]] | None:
         """The state that the last `checkpoint` of the earlier run got, and its frames until then, from which `begin` goes on; None if the
         run begins at the start. `types`: the named tuples in the state. Raises `FormatError` for a damaged checkpoint."""
-        found = checkpoint.read_checkpoint(self.folder, types) if self._resume and self._earlier else None
+        found = checkpoint.read_checkpoint(self.folder, types) if self._goes_on else None
         return None if found is None else (found.state, self.go_on(found.frames))
 
     def go_on(self, number: int) -> list[MotionFrame]:
@@ -142,12 +179,15 @@ class RunWriter:
         return frames
 
     def checkpoint(self, state: Any) -> None:
-        """Keep a state from which the run can go on after the frames so far. Raises `ShadowPuppetError` if it cannot be written."""
+        """Keep a state from which the run can go on after the frames so far. Raises `ShadowPuppetError` if it cannot be written, and as
+        `check` does: no checkpoint is of two recordings."""
+        self.check()
         checkpoint.write_checkpoint(self.folder, checkpoint.Checkpoint(len(self._motion), state))
 
     def write(self, frame: MotionFrame) -> None:
         """Add a frame. Raises `ShadowPuppetError` if it does not fit the run, or cannot be written."""
         self.begin()
+        self._lock.check()
         kept = self._motion.append(frame)
         self._keep_modes(kept)
         with self._system_errors():
@@ -177,6 +217,7 @@ class RunWriter:
         """Replace the frames so far, at the end of a run; the tables as they were go to raw.csv. Raises `ShadowPuppetError` if something
         cannot be written; the tables stay as they were."""
         self.begin()
+        self._lock.check()
         builder = MotionBuilder(revised.body_name, revised.dof_names, revised.joint_names)
         parts = [f"{name}.part" for name in (RAW, *TABLES)]
         try:
@@ -207,8 +248,9 @@ class RunWriter:
         """
         if self._tables:
             return
+        self._lock.check()
         if self._earlier:
-            _unmark(self.folder)
+            unmark(self.folder)
         with self._system_errors():
             for name in () if not self._earlier else FILES if self._before is None else MADE:
                 (self.folder / name).unlink(missing_ok=True)
@@ -216,6 +258,7 @@ class RunWriter:
                 remove_people(self.folder, (*FILES, "run.toml"))
         if self._before is None:
             self._write_info(complete=False)
+            self._keep_inputs()
         with self._system_errors():
             tables = [(self.folder / name).open("wb") for name in TABLES]
             self._tables = tables if self._resume is None else [*tables, checkpoint.open_frames(self.folder, self._before or [])]
@@ -227,9 +270,7 @@ class RunWriter:
                 table.flush()
 
     def _finish(self, complete: bool) -> None:
-        for table in self._tables:
-            with contextlib.suppress(OSError):
-                table.close()
+        self._close()
         motion = self._motion.build()
         # The most important file first, in case the disk is full.
         write_motion_npz(self.folder / "motion.npz", motion)
@@ -246,26 +287,30 @@ class RunWriter:
     @staticmethod
     def _remove_checkpoints(*folders: Path) -> None:
         """Remove what complete runs do not need any more."""
-        for path in (folder / name for folder in folders for name in (checkpoint.STATE, checkpoint.FRAMES)):
+        for path in (folder / name for folder in folders for name in (checkpoint.STATE, checkpoint.FRAMES, INPUTS)):
             with contextlib.suppress(OSError):
                 path.unlink(missing_ok=True)
 
     def _write_info(self, complete: bool) -> None:
         import tomli_w
 
+        self._lock.check()
         head = {"complete": complete, "frames": len(self._motion)}
         write_whole(self.folder / "run.toml", tomli_w.dumps(head | self.info))
 
-    def _check_same(self, earlier: Mapping[str, Any]) -> None:
-        """Raise `CompleteRun` if an earlier run is complete, `ShadowPuppetError` if its run.toml differs from this one's."""
+    def _keep_inputs(self) -> None:
+        """Keep what the run's inputs hold, for a run that goes on."""
+        if self._resume is not None and not self._of_group:
+            write_inputs(self.folder, self._resume.inputs)
+
+    def _check_same(self, resume: Resuming, earlier: Mapping[str, Any]) -> None:
+        """Raise `CompleteRun` if an earlier run is complete, `ShadowPuppetError` if it is another one than this."""
         import tomllib
 
         import tomli_w
 
         ours = tomllib.loads(tomli_w.dumps(self.info))
-        for key in sorted((earlier.keys() | ours.keys()) - {"complete", "frames", "smoothing", "floor", "people"}):
-            if difference := _difference(key, earlier.get(key), ours.get(key)):
-                raise ShadowPuppetError(f"{self.folder}: the run there cannot go on as another one: {difference}")
+        check_same(self.folder, earlier, ours, resume.inputs, (self.folder / checkpoint.STATE).exists())
         if earlier["complete"]:
             raise CompleteRun(f"{self.folder}: the run is complete: nothing is left to be done")
 
@@ -299,41 +344,3 @@ def versions() -> dict[str, str]:
         with contextlib.suppress(metadata.PackageNotFoundError):
             found[name] = metadata.version(name)
     return found
-
-
-def _check_folder(folder: Path) -> bool:
-    """Whether a folder holds an earlier run. Raises `ShadowPuppetError` if it holds other files."""
-    names = sorted(path.name for path in folder.iterdir() if path.name != LOCK)
-    if not names:
-        return False
-    info = folder / "run.toml"
-    if not info.exists() or not {"complete", "versions"} <= set(read_toml(info, FormatError)):
-        raise ShadowPuppetError(f"{folder}: found {shorten(names, 60)} in it but no run.toml of a run, expected a new or empty "
-                                "folder, or that of an earlier run, which is replaced")
-    return True
-
-
-def _difference(where: str, before: Any, now: Any) -> str:
-    """The first difference of two plain values in words; empty if they are equal."""
-    if isinstance(before, dict) and isinstance(now, dict):
-        return next(filter(None, (_difference(f"{where}.{key}", before.get(key), now.get(key)) for key in sorted(before | now))), "")
-    was, found = ("not given" if value is None else shown(value) for value in (before, now))
-    return "" if before == now else f"{where} was {was}, and is {found}"
-
-
-def earlier_run(folder: str | Path) -> dict[str, Any] | None:
-    """The contents of run.toml of the run in a folder, None if there is no run with frames. Raises `FormatError` if it is malformed."""
-    folder = Path(folder)
-    if not (folder / "run.toml").exists() or not any((folder / name).exists() for name in (TABLES[0], PEOPLE)):
-        return None
-    info = read_toml(folder / "run.toml", FormatError)
-    return info if {"complete", "versions"} <= set(info) else None
-
-
-def _unmark(folder: Path) -> None:
-    """Note in a run's run.toml that it is not complete."""
-    import tomli_w
-
-    info = read_toml(folder / "run.toml", FormatError)
-    if info["complete"]:
-        write_whole(folder / "run.toml", tomli_w.dumps(info | {"complete": False}))

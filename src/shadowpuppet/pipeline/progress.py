@@ -191,6 +191,21 @@ def json_text(value: Any) -> str:
     return json.dumps(for_json(plain(value, "value")), indent=1, ensure_ascii=False, allow_nan=False)
 
 
+def is_same_look(before: str, now: str) -> bool:
+    """Whether two texts of look.json say the same of a recording, which may lie in another place."""
+    one, other = json.loads(before), json.loads(now)
+    places = str(one.pop("recording", "")), str(other.pop("recording", ""))
+
+    def equal(a: Any, b: Any) -> bool:
+        if isinstance(a, dict) and isinstance(b, dict):
+            return a.keys() == b.keys() and all(equal(a[key], b[key]) for key in a)
+        if isinstance(a, list) and isinstance(b, list):
+            return len(a) == len(b) and all(map(equal, a, b))
+        return a == b or (isinstance(a, str) and places[0] != "" and a.replace(*places) == b)
+
+    return equal(one, other)
+
+
 def generators(options: Options) -> list[np.random.Generator]:
     """Two random generators, for the look and for the tracking, so that neither depends on what the other draws."""
     return np.random.default_rng(options.seed).spawn(2)

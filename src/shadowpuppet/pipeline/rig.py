@@ -18,9 +18,10 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.camera.mask import Mask, Seen, half_size
 from shadowpuppet.errors import SettingsError, SilhouetteError, VideoError, warn
+from shadowpuppet.io.inputs.inputs import NO_INPUTS, Inputs, inputs_of
 from shadowpuppet.io.recording import Recording
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage, chosen_views, open_recording
-from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.options import PATHS, Options
 from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.video import Image
@@ -81,6 +82,8 @@ class Rig:
     recording: Recording
     footage: tuple[Footage, ...]
     """One for each camera."""
+    inputs: Inputs = NO_INPUTS
+    """The files that are read, as they were when the rig was opened."""
 
     @property
     def is_multiview(self) -> bool:
@@ -137,13 +140,16 @@ def open_rig(path: str | Path, options: Options) -> Rig:
 
     Raises `RecordingError`, `CalibrationError`, `VideoError` or `SettingsError` if something cannot be used.
     """
+    inputs = inputs_of(path, {name: getattr(options, name) for name in PATHS})
     recording = open_recording(path, options)
     views = chosen_views(recording, options.camera)
+    others = [source for view in recording.views if not any(view is each for each in views)
+              for source in (view.video, view.background, view.masks)]
     if options.background is not None and len(views) > 1:
         raise SettingsError(f"background: found one for {len(views)} cameras, expected one each, background/<camera>.* in the recording")
     if options.region is not None and len(views) > 1:
         raise SettingsError(f"region: found a region for {len(views)} cameras, expected it with one camera only (--camera)")
-    return Rig(recording, tuple(camera_footage(recording, view, options) for view in views))
+    return Rig(recording, tuple(camera_footage(recording, view, options) for view in views), inputs.without(others))
 
 
 def read_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = False, every: int = 1) -> Generator[FrameSet]:

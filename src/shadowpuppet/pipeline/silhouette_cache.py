@@ -105,6 +105,11 @@ def _codes(mask: Mask | None, packed: bytes | None) -> Codes | None:
     return codes
 
 
+def _state(rig: Rig) -> dict[str, Any]:
+    """The state of the files on which silhouettes depend, by name: a film may be replaced between two runs."""
+    return {name: state for name, state in rig.inputs.began.items() if not name.startswith("--") or name.removeprefix("--") in SHARED}
+
+
 class SilhouetteCache:
     """Keeps the survey and the silhouettes of one recording at a time. Not for several threads."""
 
@@ -117,7 +122,7 @@ class SilhouetteCache:
 
     def survey(self, rig: Rig, options: Options, make: Callable[[Rig, Options], Survey]) -> Survey:
         """The kept survey, or a new one from `make`."""
-        film = film_of(rig.recording.path, plain_options(options))
+        film = film_of(rig.recording.path, plain_options(options)) | {"state": _state(rig)}
         if self._survey is None or film != self._film:
             self.forget()
             self._survey, self._film = make(rig, options), film

@@ -13,11 +13,12 @@ from typing import Any, Generic, NamedTuple
 import numpy as np
 
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError, warn
+from shadowpuppet.io.inputs.inputs import Resuming
 from shadowpuppet.io.people import person_folder
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.prior import read_prior
 from shadowpuppet.io.run import read_run
-from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter, write_metrics
+from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter
 from shadowpuppet.motion.motion import BLANK, Motion, MotionBuilder, MotionFrame
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.look import Survey
@@ -34,6 +35,7 @@ from shadowpuppet.pipeline.progress import (
     add_left_out,
     evaluated,
     generators,
+    is_same_look,
     json_text,
     left_out_metrics,
     set_aside,
@@ -100,7 +102,7 @@ def run(rig: Rig, kind: Kind[State, Observation, Before], folder: str | Path, op
     info = {"recording": recording.path.resolve(), "method": kind.name(options.preset, len(rig.cameras)),
             "cameras": list(rig.names) if rig.is_multiview else None, "settings": plain_options(options),
             "truth": recording.truth and recording.truth.resolve(), "begin": recording.begin or None, "end": recording.duration}
-    with RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, resume) as writer:
+    with RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, Resuming(resume, rig.inputs)) as writer:
         start = time.perf_counter()
         survey = look_around(rig, options, kind, cache, listener)
         if survey.several and (survey.look.refusal is None or options.anyway):
@@ -116,13 +118,16 @@ def run(rig: Rig, kind: Kind[State, Observation, Before], folder: str | Path, op
         motion = writer.motion if store is None else _backward(writer, subject.turned_back(state), options, listener, store)
         smooth_run(writer, [(0, subject)], options, listener, motion, leans)
         writer.info |= floor_entry(writer.motion, rig.cameras, prepared.check().person)
+        writer.check()
+        found = evaluated(rig, writer.motion)
+        frames = len(writer.motion), tracked(prepared.look.frames, options.every)
+        verdict = verdict_of_run(prepared.look, writer.motion, writer.metrics.get("set_aside", ()), frames)
+        writer.metrics |= found | {"verdict": verdict.plain()}
     written = read_run(folder)
-    metrics = written.metrics | evaluated(rig, written.motion)
-    metrics["verdict"] = verdict_of_run(prepared.look, written.motion, metrics.get("set_aside", ())).plain()
+    metrics = written.metrics | found
     warn_of_losses(written.motion)
     warn_of_left_out(metrics.get("left_out", []))
     warn_of_set_aside(metrics.get("set_aside", []))
-    write_metrics(folder, metrics)
     return Summary(Path(folder), written.motion, metrics, prepared.look)
 
 
@@ -239,11 +244,11 @@ def _resumed(writer: RunWriter, prepared: Prepared[State, Observation, Before],
     """Where a run begins: at the start, or after the frames of its checkpoint. Raises `ShadowPuppetError` if the look is another one."""
     subject, look = prepared.check(), json_text(prepared.look)
     carried, frames = writer.resumed((*subject.state_types, Carried, LeftOut)) or (Carried(look, {}, None, None, ()), [])
-    if carried.look != look:
+    if not is_same_look(carried.look, look):
         raise ShadowPuppetError(f"{writer.folder}: the run there cannot go on: its look.json differs from what the recording gives now")
     if carried.generator:
         rng.bit_generator.state = carried.generator
-    return carried, frames
+    return carried._replace(look=look), frames
 
 
 def _track(writer: RunWriter, prepared: Prepared[State, Observation, Before], kind: Kind[State, Observation, Before], options: Options,
@@ -295,6 +300,7 @@ def _track(writer: RunWriter, prepared: Prepared[State, Observation, Before], ki
                     checkpoints.keep(partial(writer.checkpoint, carried))
                 count += 1
                 listener.advance(count)
+            writer.check()  # before the overlay gets its name
     finally:
         writer.metrics |= timings(timer, kind.stages, count - len(earlier), time.perf_counter() - began)
         writer.metrics |= left_out_metrics(left_out, [footage.view.camera for footage in survey.rig.footage])

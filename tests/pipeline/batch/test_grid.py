@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 
 from shadowpuppet.errors import SettingsError, ShadowPuppetError
 from shadowpuppet.io.files.plain import for_toml
+from shadowpuppet.io.inputs.inputs import fingerprint
 from shadowpuppet.pipeline.batch.grid import Case, make_grid, read_grid, seeds_of
-from shadowpuppet.pipeline.batch.tasks import fingerprint, make_tasks
+from shadowpuppet.pipeline.batch.tasks import make_tasks
 from shadowpuppet.pipeline.options import Options, make_options, plain_options
 
 GRID = """\

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -83,11 +85,13 @@ def tracked(seen, tmp_path_factory):
     opened = open_rig(recording, options)
     survey = MULTIVIEW.survey(opened, options)
 
-    def track(folder, listener=None, resume=False, counted=2, **changed):
+    def track(folder, listener=None, resume=False, counted=2, place=None, **changed):
         shown = replace(survey, census=replace(survey.census, number=counted))
         kind = MULTIVIEW._replace(survey=lambda *_, **__: shown)
-        return track_run(opened, kind, folder, replace(options, **changed), listener or Listener(), resume=resume)
+        seen = opened if place is None else replace(open_rig(place, options), footage=opened.footage)
+        return track_run(seen, kind, folder, replace(options, **changed), listener or Listener(), resume=resume)
 
+    track.recording = recording
     return track
 
 
@@ -168,10 +172,34 @@ def test_cores_change_nothing(run, tracked, tmp_path, monkeypatch, threads, proc
         assert (other.folder / name).read_bytes() == (run.folder / name).read_bytes(), name
 
 
+class Touches(Listener):
+    """Changes the time of a file after some frame sets."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def advance(self, frames: int) -> None:
+        if frames == KILLED[1]:
+            os.utime(self.path, (1, 1))
+
+
+def test_nobody_s_run_is_complete_if_an_input_changes_while_people_are_followed(tracked, tmp_path):
+    place = shutil.copytree(tracked.recording, tmp_path / "place")
+    with pytest.raises(ShadowPuppetError, match=r"run: calibration\.toml has changed while the run went on: it is not complete"):
+        tracked(tmp_path / "run", Touches(place / "calibration.toml"), place=place)
+    folders = [tmp_path / "run", *person_folders(tmp_path / "run").values()]
+    assert len(folders) == 3
+    assert not any(tomllib.loads((folder / "run.toml").read_text())["complete"] for folder in folders)
+
+
 def test_what_a_run_cannot_go_on_from(run, tracked, tmp_path):
     left = shutil.copytree(run.folder.with_name("killed-4-spare"), tmp_path / "left")
     with pytest.raises(ShadowPuppetError, match=r"cannot go on as another one: settings\.seed was 0, and is 4"):
         tracked(left, resume=True, seed=4)
+    other = shutil.copytree(tracked.recording, tmp_path / "other")
+    (other / "calibration.toml").write_text((other / "calibration.toml").read_text() + "\n")
+    with pytest.raises(ShadowPuppetError, match=r"the run there cannot go on: calibration\.toml has changed since; expected the files"):
+        tracked(left, resume=True, place=other)
     exact = left / "person-2" / EXACT
     whole = exact.read_bytes()
     exact.write_bytes(whole[:-9])

@@ -148,6 +148,14 @@ def test_frames_in_which_every_camera_was_blind_are_no_error_of_the_joints():
     assert not blind_frames(run, [black[0] | {"why": "frozen"}], 1).any()
 
 
+@pytest.mark.parametrize(("frames", "word"), [((10, 10), "good"), ((96, 100), "good"), ((94, 100), "doubtful"), ((42, 617), "bad"),
+                                              ((10, None), "good"), ((12, 10), "good")])
+def test_a_run_with_far_fewer_frames_than_the_film_states_is_not_good(frames, word):
+    verdict = verdict_of_run(LOOK, motion(0.03), (), frames)
+    assert verdict.word == word
+    assert verdict.reasons == (() if word == "good" else (f"{frames[0]} of the film's {frames[1]} frames: is it whole?",))
+
+
 def test_what_the_look_found_is_among_the_reasons():
     verdict = verdict_of_run(replace(LOOK, doubts=(caution(HARMFUL, "film is noisy: use more light"),)), motion(0.03, doubtful=2))
     assert verdict == ("doubtful", ("film is noisy: use more light", "left arm doubtful in 20 % of frames"))

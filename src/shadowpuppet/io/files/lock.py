@@ -7,7 +7,7 @@ import os
 import socket
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 from shadowpuppet.errors import ShadowPuppetError, reason
 
@@ -15,8 +15,41 @@ LOCK = ".lock"
 """Name of the file that is locked, in the folder; it names the process that holds it, and is removed at the end."""
 
 
+class Lock(NamedTuple):
+    """A lock that is held."""
+
+    folder: Path
+    what: str
+    """What the process does in the folder, such as `run`."""
+    file: BinaryIO
+    """The open lock file. As long as it is open, no other file gets its number on the disk."""
+    place: os.stat_result
+    """Of the folder at the beginning."""
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether the folder's path still leads to the lock that is held: the folder is the same, and so is the lock file in it."""
+        try:
+            return os.path.samestat((self.folder / LOCK).stat(), os.fstat(self.file.fileno()))
+        except OSError:
+            return False
+
+    def check(self) -> None:
+        """Raise `ShadowPuppetError`, which says what happened, unless the lock `is_ours`."""
+        if self.is_ours:
+            return
+        try:
+            same = os.path.samestat(self.folder.stat(), self.place)
+        except OSError:
+            found = f"the folder was removed or renamed while the {self.what} went on"
+        else:
+            found = (f"{LOCK}, which keeps others out, was removed while the {self.what} went on, so that another one may have written here"
+                     if same else f"another folder was put in the place of that in which the {self.what} went on")
+        raise ShadowPuppetError(f"{self.folder}: {found}; the {self.what} ends here, is not complete, and writes nothing more")
+
+
 @contextlib.contextmanager
-def locked(folder: Path, what: str) -> Iterator[None]:
+def locked(folder: Path, what: str) -> Iterator[Lock]:
     """Hold the lock of a folder. Raises `ShadowPuppetError` if another process, or this one, holds it; `what` it does there, such as `run`.
 
     A file system without locks is used without one.
@@ -26,17 +59,20 @@ def locked(folder: Path, what: str) -> Iterator[None]:
         file = _opened(path, what)
     except OSError as error:
         raise ShadowPuppetError(f"{folder}: cannot be written ({reason(error)})") from None
+    lock = Lock(folder, what, file, folder.stat())
     try:
         file.truncate(0)
         file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
         file.flush()
-        yield
+        yield lock
     finally:
+        ours = lock.is_ours  # else it is that of another process
         with contextlib.suppress(OSError):  # Windows removes no open file
-            path.unlink()
+            if ours:
+                path.unlink()
         file.close()
         with contextlib.suppress(OSError):
-            if os.name == "nt":
+            if ours and os.name == "nt":
                 path.unlink()
 
 

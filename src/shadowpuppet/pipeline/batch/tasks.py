@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.errors import SettingsError, ShadowPuppetError
+from shadowpuppet.errors import SettingsError
 from shadowpuppet.io.files.plain import plain
-from shadowpuppet.io.files.text import read_toml
-from shadowpuppet.io.projects import find_project
+from shadowpuppet.io.inputs.inputs import fingerprint
 from shadowpuppet.pipeline.batch.grid import MAX_RUNS, Case
 from shadowpuppet.pipeline.options import PATHS, make_options, plain_options
 from shadowpuppet.pipeline.silhouette_cache import film_of
@@ -25,10 +23,6 @@ Track = Callable[..., Any]
 the last two may be None."""
 TRACK = "shadowpuppet.pipeline.track:track_recording"
 """The default `Track`, by name."""
-RUN_INPUTS = ("calibration.toml", "recording.toml", "video", "background", "masks", "references", "truth.*", "training.*")
-"""Parts of a recording's folder that a run depends on."""
-END_BYTES = 65536
-"""Bytes hashed at a file's start and end: films are too long to be read whole."""
 
 
 @dataclass(frozen=True)
@@ -131,56 +125,6 @@ def _check_different(chosen: Sequence[_Chosen]) -> None:
         other = known.setdefault(json.dumps(choice.said, sort_keys=True), choice.case)
         if other is not choice.case:
             raise SettingsError(f"grid: found {choice.case.label!r} and {other.label!r}, which are the same settings; expected each once")
-
-
-def fingerprint(path: Path) -> str:
-    """A hash of a file, or of the parts of a folder that a run depends on: names, sizes, and each file's first and last bytes.
-
-    It does not change if a recording is moved or copied; that of a missing path is the hash of no data.
-    """
-    digest = hashlib.sha256()
-    for name, file in sorted(set(_files(path))):
-        try:
-            digest.update(f"{name}\0{file.stat().st_size}\0".encode())
-            with file.open("rb") as data:
-                digest.update(data.read(END_BYTES))
-                data.seek(max(0, file.stat().st_size - END_BYTES))
-                digest.update(data.read(END_BYTES))
-        except OSError:
-            digest.update(b"unreadable")
-    return digest.hexdigest()
-
-
-def _files(path: Path) -> Iterator[tuple[str, Path]]:
-    """Files, each with a name that does not change when the recording is moved."""
-    if path.is_file():
-        yield "", path
-    elif path.is_dir():
-        parts = [part for pattern in RUN_INPUTS for part in path.glob(pattern)]
-        for part in [*parts, *_elsewhere(path), *_of_project(path)] or [path]:  # a folder of pictures is one part
-            inside = part.rglob("*") if part.is_dir() else [part]
-            yield from ((f"{part.name}/{file.relative_to(part)}", file) for file in inside if file.is_file())
-
-
-def _of_project(folder: Path) -> Iterator[Path]:
-    """Films, calibration and settings of another program's project."""
-    try:
-        project = find_project(folder)
-    except ShadowPuppetError:
-        return  # the run reports the error
-    if project is not None:
-        files = [*project.films.values(), folder / "Config.toml", *([project.calibration] if project.calibration else [])]
-        yield from (file for file in files if file.exists())
-
-
-def _elsewhere(folder: Path) -> Iterator[Path]:
-    """Files and folders that recording.toml names."""
-    try:
-        said = read_toml(folder / "recording.toml", ShadowPuppetError) if (folder / "recording.toml").exists() else {}
-    except ShadowPuppetError:
-        return  # the run reports the error
-    texts = [value for of in (said, *(t for t in said.values() if isinstance(t, dict))) for value in of.values() if isinstance(value, str)]
-    yield from (path for text in texts if text and os.path.exists(path := folder / text) and path != folder)
 
 
 def _names(paths: Sequence[Path]) -> list[str]:

@@ -19,6 +19,7 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.bits import Bits
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError
+from shadowpuppet.io.inputs.inputs import NO_INPUTS, Resuming
 from shadowpuppet.io.people import open_places, person_folder, write_place
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import RunWriter, write_metrics
@@ -42,6 +43,7 @@ from shadowpuppet.pipeline.progress import (
     Listener,
     StageTimer,
     evaluated,
+    is_same_look,
     json_text,
     set_aside,
     timings,
@@ -108,11 +110,13 @@ class PeopleRun:
         self.writers = dict[int, RunWriter]()
         self.metrics = dict[str, Any]()
         self.aside: Sequence[Interval] = ()
+        self.sets = 0
+        """Number of frame sets that were read."""
 
     def track(self, for_fit: np.random.Generator, for_track: np.random.Generator, smooth: Smooth) -> dict[int, dict[str, Any]]:
         """Track all people; returns each person's metrics by number, none if no person is found."""
         carried: Carried | None = self.writer.hand_over((*TYPES, Carried))
-        if carried is not None and carried.look != json_text(self.survey.look):
+        if carried is not None and not is_same_look(carried.look, json_text(self.survey.look)):
             raise ShadowPuppetError(f"{self.folder}: the run there cannot go on: its look.json differs from what the recording gives now")
         self.listener.begin(f"measuring {self.census.number} people")
         group = self._group(for_fit, for_track, carried)
@@ -123,6 +127,7 @@ class PeopleRun:
             truths = matched_truths({n: writer.motion for n, writer in self.writers.items()}, self.rig.recording.truths)
             for n, truth in truths.items():
                 self.writers[n].info["truth"] = str(truth.resolve())
+            self.writer.check()  # before each person's run is complete
         found = {n: self._finished(n, truths.get(n)) for n in self.writers}
         write_metrics(self.folder, self.metrics | {"people": len(found)})
         warn_of_set_aside(self.metrics.get("set_aside", []))
@@ -160,7 +165,8 @@ class PeopleRun:
         run = read_run(folder)
         recording = replace(self.rig.recording, truth=truth)
         metrics = run.metrics | evaluated(replace(self.rig, recording=recording), run.motion)
-        metrics["verdict"] = verdict_of_run(self.survey.look, run.motion, self.metrics.get("set_aside", ())).plain()
+        frames = self.sets, tracked(self.survey.look.frames, self.options.every)
+        metrics["verdict"] = verdict_of_run(self.survey.look, run.motion, self.metrics.get("set_aside", ()), frames).plain()
         write_metrics(folder, metrics)
         return metrics
 
@@ -240,7 +246,7 @@ class PeopleRun:
                     checkpoints.keep(partial(self._keep, group, places, clear, begun))
                 self.listener.advance(len(clear))
         finally:
-            self.aside = watch.intervals
+            self.aside, self.sets = watch.intervals, len(clear)
             count = len(clear) - (0 if carried is None else len(carried.clear))
             self.metrics |= timings(timer, STAGES, count, time.perf_counter() - began) | set_aside(watch.intervals, self.rig.names)
 
@@ -303,7 +309,8 @@ class PeopleRun:
         """Open the writer of a person's run; returns the earlier run's frames, of this `number`, after which it goes on."""
         subject, folder = member.subject, person_folder(self.folder, member.number)
         body, info = subject.body, self.info | {"person": member.number}
-        writer = RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, resume=bool(number), of_group=True)
+        resume = Resuming(bool(number), NO_INPUTS)  # the group's writer watches the inputs
+        writer = RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, resume, of_group=True)
         self.writers[member.number] = stack.enter_context(writer)
         frames = writer.go_on(number) if number else []
         writer.begin()

@@ -19,7 +19,7 @@ from shadowpuppet.pipeline.verdict.verdict import Verdict, verdict_of
 MOSTLY_LOST = 0.5
 """Share of the frames with a person above which a run that loses them is a failure, with an exit code of its own."""
 OFTEN_LOST, OFTEN_DOUBTFUL = 0.05, {1: 0.6, 2: 0.4}
-"""Shares of frames, lost (or without one of the cameras) and with a doubtful limb, above which a run is doubtful."""
+"""Shares of frames, lost (or without one of the cameras, or not in the film) and with a doubtful limb, above which a run is doubtful."""
 WIDE_LIMB = {1: 0.0, 2: 0.065}
 """Expected error (m) of such a limb's joints above which it makes the run doubtful. With several cameras an arm of a clean film may be
 doubtful in two thirds of the frames, as it might be far off, and yet be expected, rightly, to be off by 40 mm in the mean."""
@@ -33,12 +33,24 @@ MEAN_DISTANCE = 2 * np.sqrt(2 / np.pi) / np.sqrt(3)
 """Mean length of a vector of three independent normal errors, over the root of the sum of their variances."""
 
 
-def verdict_of_run(look: Look | RigLook, motion: Motion, aside: Sequence[Mapping[str, Any]] = ()) -> Verdict:
-    """The verdict on a run of a recording, from what the look found and what the run states of itself; `aside`: the entry `set_aside` of
-    metrics.json."""
+def verdict_of_run(look: Look | RigLook, motion: Motion, aside: Sequence[Mapping[str, Any]] = (),
+                   frames: tuple[int, int | None] | None = None) -> Verdict:
+    """The verdict on a run of a recording, from what the look found and what the run states of itself.
+
+    `aside`: the entry `set_aside` of metrics.json. `frames`: number of frames, or of sets of several cameras, that were read, and number
+    that the films state; None if they do not.
+    """
     cameras = len(look.cameras) if isinstance(look, RigLook) else 1
     of_motion = _cautions(motion, cameras, blind_frames(motion, aside, cameras))
-    return verdict_of(chain(of_motion, _without_cameras(aside, len(motion)), look.doubts))
+    return verdict_of(chain(_missing(*frames or (0, None)), of_motion, _without_cameras(aside, len(motion)), look.doubts))
+
+
+def _missing(found: int, stated: int | None) -> Iterator[Caution]:
+    """A reason if the films have far fewer frames than they state."""
+    share = 1 - found / stated if stated else 0.0
+    if share > OFTEN_LOST:
+        yield Caution(f"{found} frames were read, but the film states {stated}: is it whole?",
+                      f"{found} of the film's {stated} frames: is it whole?", RUINOUS if share > MOSTLY_LOST else HARMFUL)
 
 
 def lost_share(motion: Motion) -> float:
