@@ -52,6 +52,7 @@ def given(example: Path, recording: Path, ring: Path, reaching: Path) -> list[st
     return [str({"05": ring, "09": reaching}.get(example.name[:2], recording))]
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_examples_run_and_say_something(example, recording, ring, reaching, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -138,6 +138,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("frames", KILLED)
 def test_a_run_killed_anywhere_goes_on_to_the_same_result(run, tracked, frames):
     left = run.folder.with_name(f"killed-{frames}")
@@ -155,6 +156,7 @@ def test_a_run_killed_anywhere_goes_on_to_the_same_result(run, tracked, frames):
     assert len(made.images(left / "overlay.mp4")) == FRAMES
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize(("threads", "processes"), [("1", 0), ("7", 0), ("7", 1)])
 def test_cores_change_nothing(run, tracked, tmp_path, monkeypatch, threads, processes):
     monkeypatch.setenv("SHADOWPUPPET_THREADS", threads)
