@@ -42,10 +42,11 @@ QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.r
 
 
 @pytest.fixture(scope="module")
-def run(recording, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("run") / "run"
-    assert cli.run(["track", str(recording), "-o", str(folder), "--quiet", "--overlay", *QUICK]) == 0
-    return folder
+def run(recording, once):
+    def make(folder):
+        assert cli.run(["track", str(recording), "-o", str(folder), "--quiet", "--overlay", *QUICK]) == 0
+
+    return once("quick/run", make)
 
 
 def process(*tokens: object, **more) -> subprocess.Popen:
@@ -261,6 +262,7 @@ def test_info_looks_and_leaves_nothing(shell, recording, tmp_path):
     assert (code, json.loads(out)["frames"]) == (0, made.FRAMES)
 
 
+@pytest.mark.whole
 def test_evaluate_measures_again_what_track_measured(shell, recording, run):
     code, out, err = shell("evaluate", run)
     assert (code, err) == (0, "")
@@ -295,6 +297,7 @@ def test_evaluate_says_when_the_truth_is_gone(shell, run, tmp_path):
     assert "joint errors" not in out
 
 
+@pytest.mark.whole
 def test_plain_masks_are_tracked_though_they_show_no_posture(shell, recording, tmp_path):
     code, out, err = shell("track", recording, "--silhouette.method", "averaging", "-o", tmp_path / "plain", "--verbose", *QUICK)
     assert code == PERSON_LOST  # the silhouettes of this method are too poor in so small a film
@@ -306,6 +309,7 @@ def test_plain_masks_are_tracked_though_they_show_no_posture(shell, recording, t
     assert read_run(tmp_path / "plain").info["settings"]["silhouette"]["method"] == "averaging"
 
 
+@pytest.mark.whole
 def test_fit_person_shows_sizes_and_curves_and_track_uses_them(shell, recording, tmp_path):
     code, out, err = shell("fit-person", recording, "-o", "me.toml")
     assert (code, err) == (0, "")
@@ -317,6 +321,7 @@ def test_fit_person_shows_sizes_and_curves_and_track_uses_them(shell, recording,
     assert "sizes from me.toml" in out
 
 
+@pytest.mark.whole
 def test_a_whole_body_is_tracked_with_one_camera_and_its_sizes_are_kept(shell, recording, tmp_path):
     code, out, err = shell("track", recording, "-o", "run", "--body", "cylinders", *QUICK)
     assert (code, err) == (0, "")
@@ -469,6 +474,7 @@ def test_a_person_partly_outside(shell, spoilt, tmp_path):
     assert np.isfinite(motion.joints[motion.status == "tracked"]).all()
 
 
+@pytest.mark.whole
 def test_no_references_no_height_no_distance(shell, recording, tmp_path):
     bare = made.copied(recording, tmp_path / "bare", without=["references", "recording.toml"])
     code, out, err = shell("track", bare, "-o", "run", "--preset", "liu2011", "--verbose", *QUICK)
