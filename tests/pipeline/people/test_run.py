@@ -197,6 +197,7 @@ def test_the_number_is_said(run):
     assert set(run.metrics["people"]) == {1, 2}
 
 
+@pytest.mark.whole
 def test_who_was_counted_and_cannot_be_followed_is_said(tracked, tmp_path):
     with pytest.warns(ShadowPuppetWarning, match="3 people were counted, 2 could be followed: "):
         found = tracked(tmp_path / "run", counted=3, overlay=False)
