@@ -11,13 +11,33 @@ import made
 import made_rig
 import numpy as np
 import pytest
+import workers
 from hypothesis import settings
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli import app as cli
 
-settings.register_profile("no deadline", settings.default, deadline=None)  # a loaded machine is no failure
-settings.load_profile("no deadline")
+settings.register_profile("full", settings.default, deadline=None)  # a loaded machine is no failure
+settings.register_profile("quick", settings.get_profile("full"), max_examples=25)
+NAMED = pytest.StashKey[set[Path]]()
+"""Test files that the command line names: of these everything runs, marked `whole` or not."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--whole", action="store_true", help="run also what is marked `whole`, and more examples of each property")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    settings.load_profile("full" if config.getoption("--whole") or "CI" in os.environ else "quick")
+    config.stash[NAMED] = {Path(argument.partition("::")[0]).resolve() for argument in config.args}
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        workers.compile_one_at_a_time()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("whole") and not item.config.getoption("--whole") and item.path not in item.config.stash[NAMED]:
+        pytest.skip("whole")
 
 
 @pytest.fixture
@@ -35,15 +55,23 @@ def shared() -> Path:
 
 
 @pytest.fixture(scope="session")
-def recording(tmp_path_factory) -> Path:
-    """A small synthetic recording of one camera (`made.SPEC`); not to be changed."""
-    return made.make(tmp_path_factory.mktemp("made") / "tiny")
+def once(tmp_path_factory) -> Callable[[str, Callable[[Path], object]], Path]:
+    """Gives the folder of a name that a function makes: once in a session, whichever worker needs it first. It is not to be changed."""
+    base = tmp_path_factory.getbasetemp()
+    base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    return lambda name, make: workers.made_once(base / "made" / name, make)
 
 
 @pytest.fixture(scope="session")
-def rig_recording(tmp_path_factory) -> Path:
+def recording(once) -> Path:
+    """A small synthetic recording of one camera (`made.SPEC`); not to be changed."""
+    return once("tiny", made.make)
+
+
+@pytest.fixture(scope="session")
+def rig_recording(once) -> Path:
     """A small synthetic recording of four cameras (`made_rig`); not to be changed."""
-    return made_rig.write(tmp_path_factory.mktemp("made") / "rig")
+    return once("rig", made_rig.write)
 
 
 @pytest.fixture

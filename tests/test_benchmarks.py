@@ -21,6 +21,7 @@ def changed(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts}
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
 def test_a_benchmark_runs_in_its_smallest_form(script, tmp_path):
     before = changed(ROOT / "docs"), changed(ROOT / "benchmarks")

@@ -21,28 +21,29 @@ MADE = {"01": ["sample-run/joints.csv", "sample-run/overlay.mp4"], "02": ["one_p
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory) -> Path:
-    return small(tmp_path_factory.mktemp("examples"), Gesture(motion="wave_hands", seconds=3))
+def recording(once) -> Path:
+    return once("examples/recording", lambda folder: small(folder, Gesture(motion="wave_hands", seconds=3)))
 
 
 @pytest.fixture(scope="module")
-def reaching(tmp_path_factory) -> Path:
+def reaching(once) -> Path:
     """Arms before the body."""
-    return small(tmp_path_factory.mktemp("examples"), Gesture(motion="forearms_up", seconds=4), Gesture(motion="reach", seconds=5))
+    motion = Gesture(motion="forearms_up", seconds=4), Gesture(motion="reach", seconds=5)
+    return once("examples/reaching/recording", lambda folder: small(folder, *motion))
 
 
 def small(folder: Path, *motion: Gesture) -> Path:
     """One small camera."""
     spec = Spec(motion=motion, cameras=(Viewpoint(size=(160, 120)),), scene=Scene(empty_seconds=1), rate=6)
-    return synthesize(spec, folder / "recording", np.random.default_rng(1))
+    return synthesize(spec, folder, np.random.default_rng(1))
 
 
 @pytest.fixture(scope="module")
-def ring(tmp_path_factory) -> Path:
+def ring(once) -> Path:
     """Four small cameras."""
     spec = Spec(motion=(Gesture(motion="walk", seconds=2),), scene=Scene(empty_seconds=1), rate=6,
                 ring=Ring(count=4, radius=3.6, fov_deg=42, size=(160, 120)))  # fmt: skip
-    return synthesize(spec, tmp_path_factory.mktemp("examples") / "ring", np.random.default_rng(1))
+    return once("examples/ring", lambda folder: synthesize(spec, folder, np.random.default_rng(1)))
 
 
 def given(example: Path, recording: Path, ring: Path, reaching: Path) -> list[str]:
@@ -52,6 +53,7 @@ def given(example: Path, recording: Path, ring: Path, reaching: Path) -> list[st
     return [str({"05": ring, "09": reaching}.get(example.name[:2], recording))]
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_examples_run_and_say_something(example, recording, ring, reaching, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -21,6 +21,7 @@ print(around.run_forces(3).tobytes().hex(), around.run_gauss_newton(2).tobytes()
 """
 
 
+@pytest.mark.whole
 def test_what_is_compiled_now_and_what_is_loaded_from_the_cache_agree_to_the_last_bit(tmp_path):
     """Numba optimises the two apart: sums that may be taken in any order come out different."""
     surroundings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import io
+import itertools
 import json
 import os
 import re
@@ -22,6 +23,7 @@ import made
 import numpy as np
 import pytest
 from numba.core import event
+from waiting import until
 
 from shadowpuppet import jit
 from shadowpuppet.cli import app as cli
@@ -40,10 +42,11 @@ QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.r
 
 
 @pytest.fixture(scope="module")
-def run(recording, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("run") / "run"
-    assert cli.run(["track", str(recording), "-o", str(folder), "--quiet", "--overlay", *QUICK]) == 0
-    return folder
+def run(recording, once):
+    def make(folder):
+        assert cli.run(["track", str(recording), "-o", str(folder), "--quiet", "--overlay", *QUICK]) == 0
+
+    return once("quick/run", make)
 
 
 def process(*tokens: object, **more) -> subprocess.Popen:
@@ -182,15 +185,27 @@ def test_every_command_that_takes_its_time_can_be_quiet(name, shell):
     assert "--quiet" in shell(name, "--help")[1]
 
 
+def printed_until(capsys, text: str) -> list[str]:
+    """Lines of standard error up to the first with a text."""
+    printed = []
+
+    def comes() -> bool:
+        printed.append(capsys.readouterr().err)
+        return any(text in line for line in "".join(printed).splitlines())
+
+    until(comes)
+    return "".join(printed).splitlines()
+
+
 def test_progress_is_printed_where_there_is_no_terminal(capsys, monkeypatch):
     monkeypatch.setattr(terminal_module, "LOG_EVERY", 0.02)
+    monkeypatch.setattr(terminal_module, "monotonic", functools.partial(next, itertools.count(0, 0.001)))
     with terminal_module.terminal() as listener:
         listener.begin("looking at 4 films")
-        time.sleep(0.1)
+        lines = printed_until(capsys, "... looking")
         listener.begin("tracking", 80)
         listener.advance(20)
-        time.sleep(0.1)
-    lines = capsys.readouterr().err.splitlines()
+        lines += printed_until(capsys, "... tracking 20/80, ")
     assert lines[0] == "... looking at 4 films, 0 s"
     assert lines[-1].startswith("... tracking 20/80, ")
     time.sleep(0.1)
@@ -220,14 +235,14 @@ def test_a_line_of_progress_does_not_fall_into_what_is_printed_next():
 
 def test_compiling_is_said_while_it_lasts(capsys, monkeypatch):
     monkeypatch.setattr(terminal_module, "LOG_EVERY", 0.02)
+    monkeypatch.setattr(terminal_module, "monotonic", functools.partial(next, itertools.count(0, 0.001)))
     with terminal_module.terminal() as listener:
         listener.begin("measuring the person")
-        time.sleep(0.1)
+        lines = printed_until(capsys, "... measuring")
         with event.trigger_event("numba:compile", data={}):
             assert jit.is_compiling()
-            time.sleep(0.1)
+            lines += printed_until(capsys, "(a minute or two)")
         assert not jit.is_compiling()
-    lines = capsys.readouterr().err.splitlines()
     assert not lines[0].endswith("(a minute or two)")
     assert lines[-1] == "... measuring the person, 0 s, compiling, once (a minute or two)"
 
@@ -254,6 +269,7 @@ def test_info_looks_and_leaves_nothing(shell, recording, tmp_path):
     assert (code, json.loads(out)["frames"]) == (0, made.FRAMES)
 
 
+@pytest.mark.whole
 def test_evaluate_measures_again_what_track_measured(shell, recording, run):
     code, out, err = shell("evaluate", run)
     assert (code, err) == (0, "")
@@ -288,6 +304,7 @@ def test_evaluate_says_when_the_truth_is_gone(shell, run, tmp_path):
     assert "joint errors" not in out
 
 
+@pytest.mark.whole
 def test_plain_masks_are_tracked_though_they_show_no_posture(shell, recording, tmp_path):
     code, out, err = shell("track", recording, "--silhouette.method", "averaging", "-o", tmp_path / "plain", "--verbose", *QUICK)
     assert code == PERSON_LOST  # the silhouettes of this method are too poor in so small a film
@@ -299,6 +316,7 @@ def test_plain_masks_are_tracked_though_they_show_no_posture(shell, recording, t
     assert read_run(tmp_path / "plain").info["settings"]["silhouette"]["method"] == "averaging"
 
 
+@pytest.mark.whole
 def test_fit_person_shows_sizes_and_curves_and_track_uses_them(shell, recording, tmp_path):
     code, out, err = shell("fit-person", recording, "-o", "me.toml")
     assert (code, err) == (0, "")
@@ -310,6 +328,7 @@ def test_fit_person_shows_sizes_and_curves_and_track_uses_them(shell, recording,
     assert "sizes from me.toml" in out
 
 
+@pytest.mark.whole
 def test_a_whole_body_is_tracked_with_one_camera_and_its_sizes_are_kept(shell, recording, tmp_path):
     code, out, err = shell("track", recording, "-o", "run", "--body", "cylinders", *QUICK)
     assert (code, err) == (0, "")
@@ -462,6 +481,7 @@ def test_a_person_partly_outside(shell, spoilt, tmp_path):
     assert np.isfinite(motion.joints[motion.status == "tracked"]).all()
 
 
+@pytest.mark.whole
 def test_no_references_no_height_no_distance(shell, recording, tmp_path):
     bare = made.copied(recording, tmp_path / "bare", without=["references", "recording.toml"])
     code, out, err = shell("track", bare, "-o", "run", "--preset", "liu2011", "--verbose", *QUICK)
@@ -518,15 +538,15 @@ def test_a_folder_that_holds_something_else(shell, recording, tmp_path):
     assert "found thesis.tex in it but no run.toml of a run" in refused(shell, "track", recording, "-o", "thesis")
 
 
-@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
+@pytest.mark.parametrize(("name", "code"), [
+    ("SIGINT", 130), pytest.param("SIGTERM", 143, marks=pytest.mark.whole), pytest.param("SIGHUP", 129, marks=pytest.mark.whole)])
 def test_control_c_and_the_like_leave_a_run_that_can_be_read_and_goes_on(recording, tmp_path, name, code):
     folder, number = tmp_path / "run", getattr(signal, name)
     # Who starts the tests in the background has them, and so their children, ignore Ctrl-C.
     heeding = functools.partial(signal.signal, number, signal.SIG_DFL)
     child = process("track", recording, "-o", folder, "--tracker.arm.particles", "2000", "--tracker.cycles", "10", preexec_fn=heeding)
-    rows, end = folder / "joints.csv", time.monotonic() + 60
-    while child.poll() is None and time.monotonic() < end and (not rows.exists() or rows.read_text().count("\n") < 4):
-        time.sleep(0.01)
+    rows = folder / "joints.csv"
+    until(lambda: child.poll() is not None or (rows.exists() and rows.read_text().count("\n") >= 4))
     child.send_signal(number)
     _, err = child.communicate()
     assert child.returncode == code

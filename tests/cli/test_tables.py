@@ -6,6 +6,7 @@ import threading
 from types import SimpleNamespace
 
 import pytest
+from waiting import LONG
 
 from shadowpuppet.cli import batch_terminal
 from shadowpuppet.cli.batch_terminal import LINES, BatchTerminal, _clock, _pace
@@ -195,7 +196,7 @@ def test_the_lines_begin_and_end_with_the_batch(monkeypatch, capsys):
     told, said = BatchTerminal(Terminal()), threading.Event()
     monkeypatch.setattr(told._terminal.console, "print", lambda *_, **__: said.set())
     told.begin(3, 0)
-    assert said.wait(10)
+    assert said.wait(LONG)
     told.stop()
     assert told._log._end is None
 

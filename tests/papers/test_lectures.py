@@ -10,6 +10,8 @@ import pytest
 from papers.lectures.__main__ import NAMES, main
 from papers.lectures.page import LECTURES, Result, cells, page, run
 
+pytestmark = pytest.mark.whole
+
 DOCS = Path(__file__).parents[2] / "docs"
 
 

@@ -36,6 +36,8 @@ from papers.liu2011.sweeps import Measured
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.tracking.monocular.settings import make_settings
 
+pytestmark = pytest.mark.whole
+
 SEED = 5
 """Of all runs here: not the default."""
 

@@ -20,6 +20,8 @@ from shadowpuppet.synthetic import Ring, Scene, Spec, humaneva, synthesize
 from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 
+pytestmark = pytest.mark.whole
+
 SEED = 3
 """Of all runs here: not the default."""
 CLAIMS = {

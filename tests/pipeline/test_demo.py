@@ -22,6 +22,8 @@ from shadowpuppet.motion.metrics import LIMB_JOINTS
 from shadowpuppet.pipeline.synthesize import contact_sheet
 from shadowpuppet.synthetic import demo_ring_spec
 
+pytestmark = pytest.mark.whole
+
 QUICK = ["--tracker.cycles", "1", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",
          "--initialization.hypotheses", "60"]  # fmt: skip
 

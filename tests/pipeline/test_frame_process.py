@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from solids import looking
+from waiting import LONG
 
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.recording import Recording, View
@@ -128,7 +129,7 @@ def test_it_ends_when_its_reader_has_gone(tmp_path):
         given.write(pickle.dumps(task(tmp_path, (40, 40))))
     process.stdout.read(100)
     process.stdout.close()
-    assert process.wait(60) == 0
+    assert process.wait(LONG) == 0
     assert process.stderr.read() == b""
     process.stderr.close()
 

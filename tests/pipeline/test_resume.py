@@ -80,6 +80,7 @@ def film(request, recording, tmp_path_factory):
     return track
 
 
+@pytest.mark.whole
 def test_a_run_killed_anywhere_goes_on_to_the_same_result(film, tmp_path, monkeypatch):
     monkeypatch.setattr(progress, "CHECKPOINT_SECONDS", 0.0)
     monkeypatch.setattr(progress, "CHECKPOINT_COST", 2.0)  # not after every frame: rows behind the checkpoint are cut
@@ -99,6 +100,7 @@ def test_a_run_killed_anywhere_goes_on_to_the_same_result(film, tmp_path, monkey
         assert len(made.images(left / "overlay.mp4")) == number
 
 
+@pytest.mark.whole
 def test_a_run_killed_on_its_way_back_goes_on_to_the_same_result(film, tmp_path, monkeypatch):
     monkeypatch.setattr(progress, "CHECKPOINT_SECONDS", 0.0)
     folder = tmp_path / "run"

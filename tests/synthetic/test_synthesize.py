@@ -285,6 +285,7 @@ def test_a_flag_makes_faults_and_the_table_names_them(shell, tmp_path):
     assert "faults: found 'freeze', which names no kind of fault; there are: absent, black" in " ".join(err.split())
 
 
+@pytest.mark.whole
 def test_made_recordings_can_be_looked_at_and_tracked(shell):
     assert shell("-o", "made", "--motion", "wave_hands", "--size", "160x120", "--rate", "8", "--seconds", "2", "--quiet") == (0, "", "")
     code, out, _ = shell("made", "--verbose", command="info")

@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from live_film import Clock
+from waiting import LONG, until
 
 from shadowpuppet.errors import ShadowPuppetWarning, VideoError
 from shadowpuppet.video import FrameSource, network_stream, open_frames, write_image
@@ -25,14 +26,6 @@ from shadowpuppet.video.live_source import Feed, Snapshot, film_feed, open_feed
 from shadowpuppet.video.network_stream import without_secrets
 
 GREY = np.full((12, 16, 3), 90, np.uint8)
-
-
-def until(true, seconds: float = 20.0) -> None:
-    """Wait for what other threads bring about."""
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end, "it never came"
-        time.sleep(0.005)
 
 
 # The newest picture
@@ -48,7 +41,7 @@ def test_what_is_put_replaces_what_nobody_took():
 def test_a_waiting_taker_gets_what_comes():
     place = Newest[int]()
     threading.Timer(0.05, place.put, [7]).start()
-    assert place.take(timeout=10) == 7
+    assert place.take(timeout=LONG) == 7
 
 
 @given(rate=st.floats(5, 60), costs=st.lists(st.floats(0.001, 0.5), min_size=1, max_size=40))
@@ -124,18 +117,17 @@ def test_a_film_is_held_and_a_camera_is_not():
 
         def read(shots=shots, end=end):
             yield from shots
-            end.wait(10)
+            end.wait(LONG)
 
         capture = Capture(Feed("film", (16, 12), 10.0, live, read, said.append))
         capture.hold(True)
         with capture:
+            until(lambda capture=capture, expected=expected: capture.newest.put_count >= expected)
             time.sleep(0.3)
             assert capture.newest.put_count == expected
             capture.hold(False)
-            deadline = time.monotonic() + 10
-            while capture.newest.put_count < 3 and time.monotonic() < deadline:
-                time.sleep(0.01)
-            shot = capture.newest.take(1.0)
+            until(lambda capture=capture: capture.newest.put_count >= 3)
+            shot = capture.newest.take(LONG)
             end.set()
         assert shot is not None
         assert bool(said) != live
@@ -304,15 +296,15 @@ def test_who_waits_for_a_picture_of_a_film_that_ends_waits_no_longer():
     end = threading.Event()
 
     def read():
-        end.wait(20.0)
+        end.wait(LONG)
         yield from ()
 
     with Capture(Feed("film", (16, 12), math.nan, False, read)) as capture:
-        waiting = threading.Thread(target=capture.newest.take, args=(90.0,), daemon=True)
+        waiting = threading.Thread(target=capture.newest.take, args=(3 * LONG,), daemon=True)
         waiting.start()
         until(lambda: capture.newest._changed._waiters)
         end.set()
-        waiting.join(20.0)
+        waiting.join(LONG)
         assert not waiting.is_alive()
 
 
@@ -391,16 +383,19 @@ def camera_server(request):
 
 def test_a_network_camera_is_read_as_it_comes_and_taken_up_again(camera_server):
     _, _, address = camera_server
+    begun = time.monotonic()
     feed = open_feed(address)
     assert (feed.size, feed.live, feed.name) == ((64, 48), True, address)
     seen = set()
     with Capture(feed) as capture:
-        end = time.monotonic() + 20
-        while capture.newest.put_count < 40 and time.monotonic() < end:  # more than it gives at once
+        def enough() -> bool:
             shot = capture.newest.take(0.1)
             if shot is not None:
                 seen.add(int(shot.image[0, 0, 0]) // 10)
-                assert 0 <= time.monotonic() - shot.captured < 5
+                assert begun <= shot.captured <= time.monotonic()
+            return capture.newest.put_count >= 40  # more than it gives at once
+
+        until(enough)
     assert capture.newest.put_count >= 40
     assert len(seen) > 5
 

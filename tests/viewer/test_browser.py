@@ -23,6 +23,8 @@ from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
 
+pytestmark = pytest.mark.whole
+
 playwright = pytest.importorskip("playwright.sync_api")
 
 FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-dev-shm-usage")

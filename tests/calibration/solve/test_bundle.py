@@ -158,6 +158,7 @@ def test_a_lens_from_views_of_a_board():
     assert not lens_advice(fit)
 
 
+@pytest.mark.whole
 def test_a_fisheye_is_found_to_be_one():
     K = np.array([[420.0, 0, 640], [0, 420, 360], [0, 0, 1]])
     camera = Camera("wide", boards.SIZE, K, np.array([-0.02, 0.004, 0, 0]), fisheye=True)

@@ -35,6 +35,8 @@ from shadowpuppet.pipeline.batch.tasks import make_tasks, named
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.track import track_recording
 
+pytestmark = pytest.mark.whole
+
 SETTINGS = {"masks": True, "tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
 QUICK = make_grid(SETTINGS)
 FLAGS = ["--masks", "--tracker.explore", "20", "--initialization.rounds", "20", "--initialization.patience", "5",

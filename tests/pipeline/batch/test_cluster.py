@@ -21,7 +21,7 @@ from shadowpuppet.pipeline.batch import BatchListener, make_grid, run_batch
 distributed = pytest.importorskip("distributed")
 dask = pytest.importorskip("dask")
 psutil = pytest.importorskip("psutil")  # Dask needs it
-pytestmark = pytest.mark.filterwarnings("default")  # theirs are not ours
+pytestmark = [pytest.mark.whole, pytest.mark.filterwarnings("default")]  # theirs are not ours
 QUICK = make_grid({"masks": True, "tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}})
 
 

@@ -142,6 +142,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("frames", KILLED)
 def test_a_run_killed_anywhere_goes_on_to_the_same_result(run, tracked, frames):
     left = run.folder.with_name(f"killed-{frames}")
@@ -159,6 +160,7 @@ def test_a_run_killed_anywhere_goes_on_to_the_same_result(run, tracked, frames):
     assert len(made.images(left / "overlay.mp4")) == FRAMES
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize(("threads", "processes"), [("1", 0), ("7", 0), ("7", 1)])
 def test_cores_change_nothing(run, tracked, tmp_path, monkeypatch, threads, processes):
     monkeypatch.setenv("SHADOWPUPPET_THREADS", threads)
@@ -223,6 +225,7 @@ def test_the_number_is_said(run):
     assert set(run.metrics["people"]) == {1, 2}
 
 
+@pytest.mark.whole
 def test_who_was_counted_and_cannot_be_followed_is_said(tracked, tmp_path):
     with pytest.warns(ShadowPuppetWarning, match="3 people were counted, 2 could be followed: "):
         found = tracked(tmp_path / "run", counted=3, overlay=False)

@@ -358,7 +358,7 @@ def test_the_same_masks_give_the_same_points_in_any_thread():
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("company", [False, True])
-@pytest.mark.parametrize("tolerated", [0, 1, 2])
+@pytest.mark.parametrize("tolerated", [0, pytest.param(1, marks=pytest.mark.whole), 2])
 @pytest.mark.parametrize("scene", ["bodies", "noise", "border"])
 def test_viewing_edges_are_the_plain_ones(scene, tolerated, company, rng):
     lens = {"distortion": (-0.2, 0.05, 0.001, 0.0)} if scene == "bodies" else {}
