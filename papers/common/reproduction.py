@@ -4,8 +4,8 @@
 
 Folders are those that `python -m papers.liu2011 all -o FOLDER` and `python -m papers.ni2008 all -o FOLDER` wrote. A paper's first folder
 gives its pictures, figures and tables; further ones of the same paper, such as of another recording, add their answers to the table of
-claims. Tables of more than `LONGEST` rows stay in the results as CSV, unless the paper has the table. The part of a paper without a folder
-stays as it is.
+claims. Answers to questions of our own stay in the results, and so do tables of more than `LONGEST` rows that the paper does not have. The
+part of a paper without a folder stays as it is.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PAGE = "reproduction.md"
 KEYS = ("paper", "number", "name", "title", "command", "short", "recordings", "runs", "seconds", "environment", "said", "claims", "tables",
         "pictures")  # fmt: skip
 
-LONGEST = 12
+LONGEST = 8
 """Rows of a table in the page, unless it is one of the paper's."""
 
 Summary = dict[str, Any]
@@ -89,8 +89,6 @@ def section(folders: Sequence[Sequence[Summary]]) -> str:
     machine = first[0]["environment"]
     where = f"On {machine['cpu']}, {machine['cores']} cores, {machine['vectors']}; Python {machine['python']}, NumPy {machine['numpy']}."
     parts = [where + short_warning(first), "### What the paper says, and what we got", count(first), claims(folders), contradictions(first)]
-    if any(claim.get("own") for result in first for claim in result["claims"]):
-        parts += ["### Questions of our own", "Beside the paper's claims.", claims(folders, own=True)]
     return "\n\n".join([part for part in parts if part] + [experiment(result) for result in first]) + "\n"
 
 
@@ -108,15 +106,15 @@ def count(results: Sequence[Summary]) -> str:
             "computed.")
 
 
-def claims(folders: Sequence[Sequence[Summary]], own: bool = False) -> str:
-    """The table of the paper's claims, or of our `own`: results and answers of the first folder, answers of the further ones."""
+def claims(folders: Sequence[Sequence[Summary]]) -> str:
+    """The table of the paper's claims: results and answers of the first folder, answers of the further ones."""
     rows: dict[tuple[str, str], list[list[Summary]]] = {}
     for k, results in enumerate(folders):
-        for claim in (claim for result in results for claim in result["claims"] if claim.get("own", False) == own):
+        for claim in (claim for result in results for claim in result["claims"] if not claim.get("own")):
             rows.setdefault((claim["claim"], claim["where"]), [[] for _ in folders])[k].append(claim)
     named = [recordings(results) for results in folders]
-    answer = "so?" if own else "same conclusion?" if len(folders) == 1 else "same?"
-    columns = ["question" if own else "paper said", "where", "we got" if len(folders) == 1 else f"we got: {named[0]}", answer,
+    answer = "same conclusion?" if len(folders) == 1 else "same?"
+    columns = ["paper said", "where", "we got" if len(folders) == 1 else f"we got: {named[0]}", answer,
                *(f"{name}: {answer}" for name in named[1:])]  # fmt: skip
     return markdown(columns, [[*key, *judged(row[0]), *(judged(each)[1] for each in row[1:])] for key, row in rows.items()])
 
