@@ -5,8 +5,8 @@
 Each run is what `shadowpuppet track` does, through `shadowpuppet.pipeline.batch`: a second start does what is missing. Recordings are
 those of the proving grounds (`synthetic.proving_ground`, `synthetic.proving_rings`), made where they are missing. The error is that of
 joints in millimetres, a frame that is lost counting 500; `se` is the standard error of its difference from the study's first row, in pairs
-of recording and seed: differences within two of them are not significant. Tables go into docs/ablations.md, and, once all studies are done,
-pictures into docs/assets.
+of recording and seed: differences within two of them are not significant. Tables go into build/ablations.md,
+and, once all studies are done, pictures into docs/assets; docs/accuracy.md shows these, and some rows.
 """
 
 from __future__ import annotations
@@ -37,13 +37,12 @@ from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.prepare import fit_person
 
 ROOT = Path(__file__).resolve().parent.parent
-BUILD, PAGE, ASSETS = ROOT / "build", ROOT / "docs" / "ablations.md", ROOT / "docs" / "assets"
+BUILD, PAGE, ASSETS = ROOT / "build", ROOT / "build" / "ablations.md", ROOT / "docs" / "assets"
 ONE = ("man_paper", "woman_reach", "woman_random", "child_reach", "man_boxing", "woman_noisy")
 RINGS = ("rings_jog", "rings_reach", "rings_squat")
 LOST_MM = 500.0
 """What a joint of a lost frame counts."""
 FLAT = ["torso+left_arm+right_arm"]
-PLACE = r"(<!-- study: {} -->\n).*?(<!-- end of study -->)"
 
 Rows = Mapping[str, tuple[Path, dict[str, Any]]]
 """By the name of a row: the recording, and the settings."""
@@ -223,16 +222,11 @@ def said(found: Mapping[str, Result]) -> str:
 
 
 def write_page(results: Mapping[str, Mapping[str, Result]], page: Path = PAGE) -> None:
-    """Put the tables where the page has their places."""
-    text = page.read_text(encoding="utf-8")
-    for study in STUDIES:
-        if study.name in results:
-            found = results[study.name]
-            new = f"\n{table(found, study.axis)}\n\n{said(found)}\n\n"
-            text, count = re.subn(PLACE.format(study.name), lambda match: match[1] + new + match[2], text, flags=re.DOTALL)  # noqa: B023
-            if not count:
-                raise SystemExit(f"{page}: found no place for the study {study.name}")
-    page.write_text(text, encoding="utf-8")
+    """Write the tables, one section a study."""
+    sections = [f"## {study.title}\n\n{table(found, study.axis)}\n\n{said(found)}\n" for study in STUDIES
+                if (found := results.get(study.name))]  # fmt: skip
+    page.parent.mkdir(parents=True, exist_ok=True)
+    page.write_text("\n".join(sections), encoding="utf-8")
 
 
 def draw(results: Mapping[str, Mapping[str, Result]], rings: bool, file: Path) -> None:
@@ -301,7 +295,7 @@ def _smallest(folder: Path) -> list[object]:
     for name, parent in ((ONE[0], "one"), (RINGS[0], "rings")):
         smallest.make(folder / parent / name, smallest.RING if parent == "rings" else smallest.ONE)
     return ["cost", "noise", "rings_cameras", "--seeds", 1, "--workers", 0, "--recordings", 1, "--one", folder / "one",
-            "--rings", folder / "rings", "--output", folder / "out", "--page", smallest.copy(PAGE, folder)]
+            "--rings", folder / "rings", "--output", folder / "out", "--page", folder / "ablations.md"]
 
 
 def main() -> None:

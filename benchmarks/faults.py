@@ -319,12 +319,12 @@ def tables(jobs: Sequence[tuple[str, Spec, Row]], folder: Path, workers: int, ag
 
 
 def into_page(page: Path, name: str, table: str) -> None:
-    """Write a table between its markers in a page, or at the end of another file."""
+    """Write a table between its markers in a page, or at the end of a file without markers; a page without this table's leaves it out."""
     text = page.read_text("utf-8") if page.exists() else ""
     place = PLACE.format(name)
     if re.search(place, text, re.DOTALL):
         text = re.sub(place, lambda found: f"{found[1]}{table}\n{found[2]}", text, flags=re.DOTALL)
-    else:
+    elif "<!-- table: " not in text:
         text += f"{name}\n\n{table}\n\n"
     page.write_text(text, encoding="utf-8")
 

@@ -8,7 +8,7 @@
 `proving` is the proving ground (`synthetic.proving_rings`), made in build/rings where it is missing, a quarter of an hour on one core.
 Each run (recording, row, seed) is what `shadowpuppet track` does, from film to joints.csv, and leaves its measures in
 build/multiview/results: what is there is not run again, unless `--again`, so that parts can be run alone. The tables are made of all that
-is there and written into docs/accuracy_multi.md, each between its markers; `--tables` only does that.
+is there and written into docs/accuracy.md, each between its markers; `--tables` only does that.
 
 RMSE, mm, over both shoulders, elbows, wrists, hips, knees and ankles; a frame that is lost counts 500 mm for each of them.
 """
@@ -43,7 +43,7 @@ from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.synthetic import Spec, proving_rings, synthesize
 
 ROOT = Path(__file__).resolve().parent.parent
-BUILD, PAGE = ROOT / "build", ROOT / "docs" / "accuracy_multi.md"
+BUILD, PAGE = ROOT / "build", ROOT / "docs" / "accuracy.md"
 SHARED = Path(os.environ.get("SHADOWPUPPET_SHARED", ROOT.parent / "shared"))
 MEASURED = ("walking", "jogging", "boxing")
 PLACE = r"(<!-- table: {} -->\n).*?(<!-- end of table -->)"

@@ -47,3 +47,15 @@ def test_a_script_of_the_documentation_can_be_imported(script):
         if error.name is None or error.name.startswith("shadowpuppet"):
             raise
         pytest.skip(f"{error.name} is not here")
+
+
+def test_a_table_goes_to_its_place_in_a_page_or_to_the_end_of_a_file_without_places(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    into_page = importlib.import_module("faults").into_page
+    page, file = tmp_path / "page.md", tmp_path / "file.md"
+    page.write_text("<!-- table: kept -->\nold\n<!-- end of table -->\n", "utf-8")
+    for name in ("kept", "left out"):
+        into_page(page, name, "new")
+        into_page(file, name, "new")
+    assert page.read_text("utf-8") == "<!-- table: kept -->\nnew\n<!-- end of table -->\n"
+    assert file.read_text("utf-8") == "kept\n\nnew\n\nleft out\n\nnew\n\n"

@@ -144,7 +144,7 @@ def test_the_gallery_has_every_example_with_what_it_leaves():
 
 
 def test_the_commands_of_the_recipes_are_understood():
-    lines = re.findall(r"^    shadowpuppet (.+?)(?:  .*)?$", (DOCS / "tasks.md").read_text("utf-8"), re.MULTILINE)
+    lines = re.findall(r"^    shadowpuppet (.+?)(?:  .*)?$", (DOCS / "start.md").read_text("utf-8"), re.MULTILINE)
     assert len(lines) > 15
     for line in lines:
         command, *_ = app.parse_args(line, exit_on_error=False, print_error=False)

@@ -172,7 +172,7 @@ def test_every_table_of_settings_is_in_the_manual():
     of = {"tracker": ("", "torso", "arm"), "multiview": ("", "surface", "gauss_newton", "forces", "hull"), "silhouette": ("",),
           "initialization": ("",), "training": ("",)}  # fmt: skip
     tables = {f"{table}{'.' + part if part else ''}" for table, parts in of.items() for part in parts}
-    assert tables <= set(re.findall(r"<!-- settings: (\S+) -->", docs("settings.md")))
+    assert tables <= set(re.findall(r"<!-- settings: (\S+) -->", docs("commands.md")))
 
 
 def said() -> str:

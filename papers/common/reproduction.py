@@ -3,8 +3,9 @@
     python -m papers.common.reproduction FOLDER...
 
 Folders are those that `python -m papers.liu2011 all -o FOLDER` and `python -m papers.ni2008 all -o FOLDER` wrote. A paper's first folder
-gives its pictures and tables; further ones of the same paper, such as of another recording, add columns to the table of claims. The part of
-a paper without a folder stays as it is.
+gives its pictures, figures and tables; further ones of the same paper, such as of another recording, add their answers to the table of
+claims. Answers to questions of our own stay in the results, and so do tables of more than `LONGEST` rows that the paper does not have. The
+part of a paper without a folder stays as it is.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ DOCS = Path(__file__).parents[2] / "docs"
 PAGE = "reproduction.md"
 KEYS = ("paper", "number", "name", "title", "command", "short", "recordings", "runs", "seconds", "environment", "said", "claims", "tables",
         "pictures")  # fmt: skip
+
+LONGEST = 8
+"""Rows of a table in the page, unless it is one of the paper's."""
 
 Summary = dict[str, Any]
 """Contents of an experiment's NAME.json."""
@@ -85,8 +89,6 @@ def section(folders: Sequence[Sequence[Summary]]) -> str:
     machine = first[0]["environment"]
     where = f"On {machine['cpu']}, {machine['cores']} cores, {machine['vectors']}; Python {machine['python']}, NumPy {machine['numpy']}."
     parts = [where + short_warning(first), "### What the paper says, and what we got", count(first), claims(folders), contradictions(first)]
-    if any(claim.get("own") for result in first for claim in result["claims"]):
-        parts += ["### Questions of our own", "Beside the paper's claims.", claims(folders, own=True)]
     return "\n\n".join([part for part in parts if part] + [experiment(result) for result in first]) + "\n"
 
 
@@ -104,18 +106,17 @@ def count(results: Sequence[Summary]) -> str:
             "computed.")
 
 
-def claims(folders: Sequence[Sequence[Summary]], own: bool = False) -> str:
-    """The table of the paper's claims, or of our `own`, with a pair of columns for each folder."""
+def claims(folders: Sequence[Sequence[Summary]]) -> str:
+    """The table of the paper's claims: results and answers of the first folder, answers of the further ones."""
     rows: dict[tuple[str, str], list[list[Summary]]] = {}
     for k, results in enumerate(folders):
-        for claim in (claim for result in results for claim in result["claims"] if claim.get("own", False) == own):
+        for claim in (claim for result in results for claim in result["claims"] if not claim.get("own")):
             rows.setdefault((claim["claim"], claim["where"]), [[] for _ in folders])[k].append(claim)
     named = [recordings(results) for results in folders]
-    columns = ["question" if own else "paper said", "where"]
-    for name in named:
-        answer = "so?" if own else "same conclusion?" if len(folders) == 1 else "same?"
-        columns += ["we got" if len(folders) == 1 else f"we got: {name}", answer]
-    return markdown(columns, [[*key, *(cell for each in row for cell in judged(each))] for key, row in rows.items()])
+    answer = "same conclusion?" if len(folders) == 1 else "same?"
+    columns = ["paper said", "where", "we got" if len(folders) == 1 else f"we got: {named[0]}", answer,
+               *(f"{name}: {answer}" for name in named[1:])]  # fmt: skip
+    return markdown(columns, [[*key, *judged(row[0]), *(judged(each)[1] for each in row[1:])] for key, row in rows.items()])
 
 
 def judged(found: Sequence[Summary]) -> tuple[str, str]:
@@ -134,7 +135,7 @@ def contradictions(results: Sequence[Summary]) -> str:
     """Lists of the claims that our runs contradict, and of those whose answer depends on the reading."""
     parts = []
     for answer, title in ((False, "Where our runs contradict the paper"), (DEPENDS, "Where the answer depends on how the paper is read")):
-        lines = [f"- *{claim['claim']}* ({claim['where']}): {claim['got']}; see [`{result['name']}`](#{anchor(result)})."
+        lines = [f"- *{claim['claim']}* ({claim['where']}): see [`{result['name']}`](#{anchor(result)})."
                  for result in results for claim in result["claims"] if claim["same"] == answer and not claim.get("own")]  # fmt: skip
         parts += [f"**{title}:**", "\n".join(lines)] if lines else []
     return "\n\n".join(parts)
@@ -150,7 +151,8 @@ def experiment(result: Summary) -> str:
     runs = f", {result['runs']} runs" if result["runs"] > 1 else ""
     parts = [f"### {result['title']} {{ #{anchor(result)} }}", f"`{result['command']}`{runs}, {result['seconds']:.0f} s."]
     pictures = [f"![{Path(name).stem.replace('_', ' ')}](assets/{result['paper']}_{name})" for name in result["pictures"]]
-    tables = [markdown(table["columns"], table["rows"]) for table in result["tables"].values()]
+    whole = result["name"].startswith("table_")
+    tables = [markdown(table["columns"], table["rows"]) for table in result["tables"].values() if whole or len(table["rows"]) <= LONGEST]
     return "\n\n".join([*parts, *pictures, *(["\n".join(f"- {line}" for line in result["said"])] if result["said"] else []), *tables])
 
 

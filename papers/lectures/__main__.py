@@ -1,4 +1,4 @@
-"""Run a paper's algorithm on one frame: `python -m papers.lectures liu2011`, with --page also making its page of the documentation."""
+"""Run a paper's algorithm on one frame: `python -m papers.lectures liu2011`, with --page also writing it as a page with its pictures."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from pathlib import Path
 
 from papers.lectures.page import LECTURES, page, run
 
-DOCS = LECTURES.parents[1] / "docs"
 NAMES = ("liu2011", "ni2008")
 
 
@@ -19,15 +18,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m papers.lectures", description=__doc__)
     parser.add_argument("name", choices=NAMES)
     parser.add_argument("-o", "--output", type=Path, default=Path("lecture-out"), metavar="FOLDER", help="where pictures are written")
-    parser.add_argument("--page", action="store_true", help="write docs/NAME_one_frame.md and its pictures, in docs/assets")
+    parser.add_argument("--page", action="store_true", help="write NAME_one_frame.md there, with text, code, output and pictures")
     asked = parser.parse_args(argv)
     script = (LECTURES / f"{asked.name}.py").read_text("utf-8")
-    folder = DOCS / "assets" if asked.page else asked.output
+    folder = asked.output / "assets" if asked.page else asked.output
     folder.mkdir(parents=True, exist_ok=True)
     with contextlib.chdir(folder):
         results = run(script, asked.name)
     if asked.page:
-        (DOCS / f"{asked.name}_one_frame.md").write_text(page(script, results), "utf-8")
+        (asked.output / f"{asked.name}_one_frame.md").write_text(page(script, results), "utf-8")
     print(*(result.printed for result in results if result.printed), f"pictures: {folder.resolve()}", sep="\n")
     return 0
 

@@ -7,8 +7,8 @@
 # each step makes of the particles. Where the package has the step as a function, the page calls it too and checks that both agree.
 #
 # The page is made from the script `papers/lectures/liu2011.py`, whose cells (`# %%`) open as a notebook in VS Code, Spyder, PyCharm and
-# Jupytext. To run it: `python -m papers.lectures liu2011` in the root of the repository, with the extra `report`; `--page` updates this
-# page.
+# Jupytext. To run it: `python -m papers.lectures liu2011` in the root of the repository, with the extra `report`; `--page` writes
+# this page.
 
 # %%
 import tempfile
@@ -256,6 +256,6 @@ save_picture(figure, Path("liu2011_one_frame_cycles.png"))
 # %% [markdown]
 # *Cost of the estimate over the cycles.*
 #
-# Where to go on: the whole film is `shadowpuppet track FOLDER --preset liu2011`; the paper's figures over films are in [the papers'
-# experiments](reproduction.md); the method with all its formulas is in [the method](method.md); your own resampler in place of DRS takes
-# forty lines ([extending](extending.md)).
+# Where to go on: the whole film is `shadowpuppet track FOLDER --preset liu2011`; the paper's figures over films are in the papers'
+# experiments (`docs/reproduction.md`); the method with all its formulas is in `docs/method.md`; your own resampler in place of DRS takes
+# forty lines (`docs/extending.md`).

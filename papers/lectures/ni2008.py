@@ -8,8 +8,8 @@
 # too and checks that both agree.
 #
 # The page is made from the script `papers/lectures/ni2008.py`, whose cells (`# %%`) open as a notebook in VS Code, Spyder, PyCharm and
-# Jupytext. To run it: `python -m papers.lectures ni2008` in the root of the repository, with the extra `report`; `--page` updates this
-# page.
+# Jupytext. To run it: `python -m papers.lectures ni2008` in the root of the repository, with the extra `report`; `--page` writes
+# this page.
 
 # %%
 from dataclasses import replace
@@ -255,6 +255,6 @@ save_picture(figure, Path("ni2008_one_frame_estimate.png"))
 # %% [markdown]
 # *The estimate over three of the silhouettes.*
 #
-# `MultiviewTracker.cycle` is these five steps in one call. Where to go on: the paper's figures and Table II are in [the papers'
-# experiments](reproduction.md); all formulas in [the method](method.md); `shadowpuppet track FOLDER --preset ni2008` tracks a recording
+# `MultiviewTracker.cycle` is these five steps in one call. Where to go on: the paper's figures and Table II are in the papers'
+# experiments (`docs/reproduction.md`); all formulas in `docs/method.md`; `shadowpuppet track FOLDER --preset ni2008` tracks a recording
 # this way, and without `--preset` by Gauss-Newton in place of forces, which is faster and nearer.

@@ -29,9 +29,8 @@ def make(request: Request) -> Outcome:
         outcome.tables[f"{name}_dof"] = spreads(case, runs)
         outcome.verdicts += verdicts(case, runs, f"{name}.png")
         outcome.settings |= told(case)
-    outcome.said.append("The elbow roll is the rotation of the bent forearm about the upper arm: while the arm is straight, it is "
-                        "undetermined. The paper does not say which two rotations an elbow has, so that all is judged in other "
-                        "coordinates, too: the flexion's two components, bends forward and aside, which are regular at a straight arm.")
+    outcome.said.append("The roll of an elbow is undetermined while the arm is straight, so that all is judged in the flexion's two "
+                        "components, too: bends forward and aside.")
     return outcome
 
 

@@ -206,15 +206,11 @@ def said(found: Found) -> list[str]:
     alone = ", ".join(f"{motion} {np.mean(runs.rmse):.0f} mm" for (motion, name), runs in found.items() if name == ALONE.name)
     legs = "; ".join(f"{name} " + ", ".join(f"{motion} {np.mean([one.exchanged for one in found[motion, name].errors]):.0%}"
                                             for motion in motions_of(found)) for name in readings(found, "image force"))  # fmt: skip
-    return [f"Lost: joints are {1000 * FAR:.0f} mm off on average in over {OFTEN:.0%} of the frames. There is no search after a "
-            "loss, unlike in `shadowpuppet track`. Times are on one core, for tracking alone; the paper's are for MATLAB.",
-            "The image force is read in two ways, as the paper says only that it is \"image force/ICP based, similar to\" its ref. [11]: "
-            "as plain ICP, without normals and bound; and as the paper's own forces on one particle, with 12 or 40 iterations or until "
-            "they balance. Both pass a force on to the joints above, as that reference's dynamics do; without that the person is lost at "
-            f"once ({alone}).",
+    return [f"Lost: joints are {1000 * FAR:.0f} mm off on average in over {OFTEN:.0%} of the frames. Times are on one core, for "
+            "tracking alone; the paper's are for MATLAB.",
+            "The image force is read in two ways: as plain ICP, and as the paper's own forces on one particle, with 12 or 40 iterations or "
+            f"until they balance. Both pass a force on to the joints above; without that the person is lost at once ({alone}).",
             f"Share of the frames in which the image force has exchanged left and right leg: {legs}.",
-            "The particle filter is read in two ways, too: plain, and annealed (its refs. [14] and [15]), with as many weighings. Its "
-            "noise is [chosen](#ni2008-choices) on other recordings.",
-            "Two rows are no trackers. *Forces from the true pose* begin at the true pose in every frame: what they leave is the body's "
-            f"and the forces' part of the error. *{FLOOR.capitalize()}* fits the ten cylinders to the true joints: no method can be "
-            "nearer."]
+            "The particle filter is read in two ways, too: plain, and annealed with as many weighings.",
+            "Two rows are no trackers. *Forces from the true pose* begin at the true pose in every frame. "
+            f"*{FLOOR.capitalize()}* fits the ten cylinders to the true joints: no method can be nearer."]

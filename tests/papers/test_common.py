@@ -267,14 +267,21 @@ def test_the_page_is_built_of_results_and_keeps_what_is_not_named(tmp_path, docs
     page = (docs / "reproduction.md").read_text("utf-8")
     assert "as it was" not in page
     assert page.endswith("<!-- others -->\nkept\n<!-- end of others -->\n")
-    assert "| paper said | where | we got: made | same? | we got: lab | same? |" in page
-    assert "| one is less than two | Table I | 3 | **no** | 1 | yes |" in page
+    assert "| paper said | where | we got: made | same? | lab: same? |" in page
+    assert "| one is less than two | Table I | 3 | **no** | yes |" in page
     assert "Of 2 conclusions 0 are the same here, 1 are not, and for 1 the runs are inconclusive" in page
     assert [line for line in page.splitlines() if line.startswith("- *")] == [
-        "- *one is less than two* (Table I): 3; see [`tried`](#tests-tried)."]
+        "- *one is less than two* (Table I): see [`tried`](#tests-tried)."]
     assert "![tried](assets/tests_tried.png)" in page
     assert (docs / "assets" / "tests_tried.png").read_bytes() == (tmp_path / "a" / "tried.png").read_bytes()
     assert "mean little" not in page
+
+
+def test_long_tables_stay_in_the_results_unless_the_paper_has_them(tmp_path):
+    (found,) = reproduction.read_results(results(tmp_path / "a", 1))
+    found["tables"] = {"long": {"columns": ["n"], "rows": [[n] for n in range(reproduction.LONGEST + 1)]}}
+    assert "| n |" not in reproduction.experiment(found)
+    assert "| n |" in reproduction.experiment(found | {"name": "table_2"})
 
 
 def test_short_results_are_reported_as_such(tmp_path, docs):

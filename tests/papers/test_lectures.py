@@ -1,4 +1,4 @@
-"""Each paper's algorithm on one frame: the scripts run, show what their text says, and are the documentation's pages."""
+"""Each paper's algorithm on one frame: the scripts run, show what their text says, and become pages with their pictures."""
 
 from __future__ import annotations
 
@@ -12,27 +12,36 @@ from papers.lectures.page import LECTURES, Result, cells, page, run
 
 pytestmark = pytest.mark.whole
 
-DOCS = Path(__file__).parents[2] / "docs"
-
 
 def script(name: str) -> str:
     return (LECTURES / f"{name}.py").read_text("utf-8")
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_the_page_has_the_scripts_text_and_code(name):
-    text = (DOCS / f"{name}_one_frame.md").read_text("utf-8")
+@pytest.fixture(scope="module", params=NAMES)
+def made(request, tmp_path_factory) -> tuple[str, Path]:
+    """A lecture's name, and the folder with its page and pictures."""
+    folder = tmp_path_factory.mktemp(request.param)
+    assert main([request.param, "-o", str(folder), "--page"]) == 0
+    return request.param, folder
+
+
+def test_the_page_has_the_scripts_text_code_and_pictures(made):
+    name, folder = made
+    text = (folder / f"{name}_one_frame.md").read_text("utf-8")
+    pictures = re.findall(r"\((assets/.*?\.png)\)", text)
+    assert pictures
+    assert [picture for picture in pictures if not (folder / picture).is_file()] == []
     said = re.sub(r"\n\n(```text\n.*?\n```|!\[.*?\)(?=\n))", "", text, flags=re.DOTALL)
     assert said == page(script(name), [Result()] * len(cells(script(name))))
     assert text.count("```text") > 5
 
 
 def printed_by(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """What the cells print; the pictures of the page are those that they write."""
+    """What the cells print; each picture is written once."""
     monkeypatch.chdir(folder)
     results = run(script(name), name)
-    pictures = re.findall(r"\(assets/(.*?\.png)\)", (DOCS / f"{name}_one_frame.md").read_text("utf-8"))
-    assert [picture for result in results for picture in result.pictures] == pictures
+    pictures = [picture for result in results for picture in result.pictures]
+    assert sorted(pictures) == sorted(path.name for path in folder.glob("*.png"))
     return "\n".join(result.printed for result in results)
 
 

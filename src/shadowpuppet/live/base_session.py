@@ -33,7 +33,7 @@ GONE = 2.0
 
 
 LAG = 0.1
-"""Lag (s) of smoothed motion: more takes hardly more of the shaking away (docs/smoothing.md)."""
+"""Lag (s) of smoothed motion: more takes hardly more of the shaking away (docs/live.md)."""
 
 
 Images = tuple[Image | None, ...]

@@ -177,7 +177,7 @@ class MultiviewTracker:
         s, pose = self.settings, state.pose
         weigh, refine = self.weigh(observation), self.refine(observation, state.pose)
         # Step 1: the last frame's particles (s, x, w). The state s is the region of the motion prior in which the refined pose x lies:
-        # `proposals` finds it. The paper keeps the region drawn before refinement; this lost a whole film (docs/method.md).
+        # `proposals` finds it. The paper keeps the region drawn before refinement (docs/method.md).
         particles = state.particles
         for cycle in range(s.cycles or 1):
             # Step 2, selection: draw particles by their weights.
