@@ -149,3 +149,23 @@ def test_the_commands_of_the_recipes_are_understood():
     for line in lines:
         command, *_ = app.parse_args(line, exit_on_error=False, print_error=False)
         assert command.__name__.strip("_") == line.split()[0]
+
+
+def promised_tests() -> list[tuple[str, str]]:
+    """Files and functions of the tests that SECURITY.md names; "::name" is of the file before it."""
+    found, path = list[tuple[str, str]](), ""
+    for file, name in re.findall(r"`(tests/[\w/]+\.py)?(?:::(\w+))?`", (ROOT / "SECURITY.md").read_text("utf-8")):
+        path = file or path
+        found += [(path, name)] if name else []
+    return found
+
+
+@pytest.mark.parametrize(("path", "name"), promised_tests())
+def test_a_promise_of_security_names_a_test_that_is_there(path, name):
+    assert any(isinstance(node, ast.FunctionDef) and node.name == name for node in parsed(str(ROOT / path)).body)
+
+
+def test_every_promise_of_security_names_a_test():
+    rows = re.findall(r"^\| .+ \| (.+) \|$", (ROOT / "SECURITY.md").read_text("utf-8"), re.MULTILINE)[1:]
+    assert len(rows) > 10
+    assert all("::" in tests for tests in rows)

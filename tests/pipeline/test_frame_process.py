@@ -83,6 +83,18 @@ def test_the_sets_are_those_of_threads(tmp_path, started, more):
     theirs[0].seen.masks[0][0, 0] = True  # arrays belong to who has them
 
 
+def test_nothing_of_the_current_folder_is_imported(tmp_path, started, monkeypatch):
+    here = tmp_path / "here"
+    here.mkdir()
+    for name in ("sitecustomize", "usercustomize", "numpy", "pickle", "shadowpuppet"):
+        (here / f"{name}.py").write_text(f"open({str(tmp_path / f'executed-{name}')!r}, 'w').close()\n")
+    wanted = task(tmp_path)
+    monkeypatch.chdir(here)
+    assert len(list(frames_beside(wanted))) == 12
+    assert len(started) == 1
+    assert not list(tmp_path.glob("executed-*"))
+
+
 def test_its_warnings_are_ours(tmp_path, started):
     with pytest.warns(ShadowPuppetWarning, match=r"cam2.mp4: ends at 0.30 s; .* without camera 'cam2'") as caught:
         assert len(list(frames_beside(task(tmp_path, (12, 4, 12))))) == 12

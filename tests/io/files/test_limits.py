@@ -148,6 +148,15 @@ def test_few_bytes_a_number_are_no_way_to_fill_the_memory(tmp_path):
     assert memory_of(imports, "read_motion", tmp_path / "12000000.npz", tmp_path / "1.npz") < 300e6
 
 
+def test_a_table_of_many_short_cells_takes_little_memory(tmp_path):
+    """As a text of its own every cell would take forty times its place in the file."""
+    for count in (10, 1_000_000):
+        (tmp_path / f"{count}.csv").write_text("time,a_x,a_y,a_z\n" + "".join(f"{n},1,2,3\n" for n in range(count)))
+    large = tmp_path / "1000000.csv"
+    found = memory_of("from shadowpuppet.io.motion.motion_files import read_motion", "read_motion", large, tmp_path / "10.csv")
+    assert found < 10 * large.stat().st_size
+
+
 def test_a_lock_is_held_by_one_and_names_it(tmp_path):
     with locked(tmp_path, "run"):
         with pytest.raises(ShadowPuppetError, match=rf"another run at work in it \(process {os.getpid()} on "), locked(tmp_path, "run"):

@@ -536,3 +536,12 @@ def test_workers_end_with_who_began_them(recording, tmp_path):
     child.kill()
     child.communicate(timeout=60)
     wait_for(lambda: not group(child.pid), 60)
+
+
+def test_nothing_of_the_current_folder_is_executed(recording, tmp_path):
+    for name in ("sitecustomize", "usercustomize", "numpy", "signal", "multiprocessing", "shadowpuppet"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / f'executed-{name}')!r}, 'w').close()\n")
+    command = [sys.executable, "-P", "-m", "shadowpuppet", "batch", recording, "-o", "out", "--seeds", "0:2", "--workers", "2", *FLAGS]
+    done = subprocess.run([*map(str, command)], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert not list(tmp_path.glob("executed-*"))

@@ -49,7 +49,7 @@ def read_parquet(path: str | Path) -> JointTable:
     try:
         check_regular(path)
         with path.open("rb") as file:
-            source = parquet.ParquetFile(file)
+            source = parquet.ParquetFile(file, pre_buffer=False)
             columns = tuple(source.schema_arrow.names)
             if "time" not in columns:
                 raise FormatError(f"{path}: no column 'time'; columns there: {shorten(columns)}")
@@ -87,7 +87,7 @@ def _check(source: Any, path: Path, names: list[str]) -> None:
 
 def _numbers(source: Any, name: str, arrow: ModuleType) -> NDArray[np.float64]:
     """A column (T,), NaN for null."""
-    return source.read([name]).column(name).cast(arrow.float64()).to_numpy()
+    return source.read([name], use_threads=False).column(name).cast(arrow.float64()).to_numpy()
 
 
 def _arrow(path: str | Path) -> tuple[ModuleType, ModuleType]:
