@@ -35,12 +35,13 @@ def run_all(what: str, task: Callable[[Job], Result], jobs: Sequence[Job], worke
             for done in as_completed(waiting):
                 _counted(progress, bar, done.result())
             return [done.result() for done in waiting]
-        except BrokenProcessPool:
+        except BrokenProcessPool:  # the pool itself ends the jobs that are left: one that is cancelled meanwhile is an error in its thread
             _pool.cache_clear()
             raise ShadowPuppetError(f"{what}: a process was killed (is there enough memory?); try again with fewer --workers") from None
-        finally:
+        except BaseException:
             for left in waiting:
                 left.cancel()
+            raise
 
 
 @lru_cache(maxsize=1)
