@@ -7,7 +7,7 @@ import errno
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from shadowpuppet.errors import FILE_MEMORY, VideoError, check_regular, choices, reason
 from shadowpuppet.threads import thread_limit
@@ -47,7 +47,7 @@ def opened(path: Path, threads: int | None = None) -> Iterator[tuple[InputContai
         check_regular(path)
         # "file:": a name with a colon is no protocol.
         with within_memory(path):
-            container = av.open(f"file:{path}", options=DOORS | GUARDS, metadata_errors="replace")
+            container = av.open(f"file:{path}", options=DOORS | GUARDS, **lenient())
     except (OSError, av.error.FFmpegError) as error:
         raise VideoError(_why_not(path, error)) from None
     with within_memory(path), container:
@@ -66,6 +66,13 @@ def opened(path: Path, threads: int | None = None) -> Iterator[tuple[InputContai
         yield container, streams[0]
 
 
+def lenient() -> dict[str, Any]:
+    """Arguments of `av.open` with which names in a file need be no text: PyAV 19 needs none, and knows none."""
+    from av import __version__
+
+    return {"metadata_errors": "replace"} if int(__version__.split(".")[0]) < 19 else {}
+
+
 def _stated_size(path: Path) -> tuple[int, int]:
     """Width and height of a film's frames that are too large to be decoded, without decoding any; 0, 0 if they are not stated, or are more
     than FFmpeg can count."""
@@ -74,7 +81,7 @@ def _stated_size(path: Path) -> tuple[int, int]:
 
     options = DOORS | {"skip_frame": "all"}
     with (contextlib.suppress(OSError, av.error.FFmpegError),
-          av.open(f"file:{path}", options=options, metadata_errors="replace") as container):  # fmt: skip
+          av.open(f"file:{path}", options=options, **lenient()) as container):  # fmt: skip
         return next(((each.codec_context.width, each.codec_context.height) for each in container.streams.video
                      if each.codec_context is not None), (0, 0))
     return 0, 0

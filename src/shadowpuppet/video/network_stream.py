@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from shadowpuppet.errors import VideoError, reason
-from shadowpuppet.video.container import CONTAINERS, GUARDS
+from shadowpuppet.video.container import CONTAINERS, GUARDS, lenient
 from shadowpuppet.video.film import converter
 from shadowpuppet.video.frames import Image, Size, size_of
 
@@ -67,7 +67,7 @@ def _opened(address: str, name: str) -> tuple[InputContainer, VideoStream]:
                "flags": "low_delay", "analyzeduration": "1000000",
                **({"rtsp_transport": "tcp"} if address.lower().startswith("rtsp") else {})}
     try:
-        container: Any = av.open(address, options=options, metadata_errors="replace", timeout=(OPEN_SECONDS, READ_SECONDS))
+        container: Any = av.open(address, options=options, **lenient(), timeout=(OPEN_SECONDS, READ_SECONDS))
     except (OSError, av.error.FFmpegError) as error:
         raise VideoError(f"{name}: no stream of pictures there that can be read ({_why(error)})") from None
     if not any(each.codec_context is not None for each in container.streams.video):
