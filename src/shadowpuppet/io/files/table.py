@@ -28,6 +28,8 @@ SEPARATORS = {";": "semicolons", "\t": "tabs"}
 """Signs with which other programs separate columns."""
 FORMULA = re.compile(r"'*[=+\-@\t\r\n\uff0b\uff0d\uff1d\uff20]")
 """Beginning of a cell that a spreadsheet may take for a formula, with the apostrophes before it."""
+COMMA = re.compile(r"[+-]?\d*,\d+(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
+"""A number with a decimal comma, as programs of many countries write it."""
 NUMBER = re.compile(r"-?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|-?(inf|nan)")
 
 
@@ -100,8 +102,14 @@ def number(path: Path, line: int, column: str, cell: str) -> float:
     except ValueError:
         value = np.inf
     if value in (np.inf, -np.inf):
-        raise FormatError(f"{path}: line {line}, column {column!r}: found {shorten([cell])!r}, expected a number or nothing")
+        raise FormatError(f"{path}: line {line}, column {column!r}: found {shorten([cell])!r}, expected a number or nothing"
+                          f"{with_point(cell)}")
     return value
+
+
+def with_point(cell: str) -> str:
+    """The end of a message about a cell that is no number: the decimal sign that is expected, if the cell has a decimal comma."""
+    return f", with a decimal point: {cell.strip().replace(',', '.')}" if COMMA.fullmatch(cell.strip()[:60]) else ""
 
 
 def check_times(path: Path, times: Array, lines: Sequence[int] | NDArray[np.int64]) -> None:
