@@ -95,6 +95,11 @@ class _Lines:
         return self.text[begin : self.at]
 
 
+def lines_of(text: str) -> Iterator[str]:
+    """The lines of a text, with their ends, for a reader of CSV."""
+    return _Lines(text)
+
+
 def number(path: Path, line: int, column: str, cell: str) -> float:
     """The number in a cell; NaN if it is empty. Raises `FormatError` naming line and column."""
     try:
@@ -128,8 +133,11 @@ def read_table(path: Path, cut: bool = False) -> Table:
     `cut`: ignore a last line without a line end, as the writer may have been killed.
     """
     text = read_text(path)
-    if cut:
-        text = text[: text.rfind("\n") + 1]
+    return table_of(path, text[: text.rfind("\n") + 1] if cut else text)
+
+
+def table_of(path: Path, text: str) -> Table:
+    """The table in the text of a file, as `read_table` returns it."""
     columns, begins, numbers, begin = None, array("q"), array("q"), 0
     reader = csv.reader(lines := _Lines(text))
     try:

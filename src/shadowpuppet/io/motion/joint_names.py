@@ -25,13 +25,13 @@ CENTRAL = {
 
 `pelo`, `trxo`, ... are virtual markers of Vicon's gait model, as HumanEva's motion files have them, and `torsodistal`, ... the same in
 its own programs; `hips`, `upleg`, `forearm` are Mixamo's and the CMU database's in BVH; `shldr`, `shin` Poser's, `shldrbend`,
-... its later figures' (DAZ); `necktwist01`, `calf`, `mid1` iClone's, after `CC_Base_`. COCO, HALPE_26 and BODY_25
+... its later figures' (DAZ); `uarm`, `farm` Motive's; `necktwist01`, `calf`, `mid1` iClone's, after `CC_Base_`. COCO, HALPE_26 and BODY_25
 call joints as we do, with `midhip` (OpenPose), `chip` (Pose2Sim) or `hip` (HALPE_26) for the pelvis.
 """
 SIDED = {
     # beside `arm`, `shoulder` is a collar bone's
-    "shoulder": ("sjc", "arm", "upperarm", "uparm", "shldr", "shldrbend", "shoulder", "clo", "upperarmproximal"),
-    "elbow": ("ejc", "elbow", "forearm", "forearmbend", "lowerarm", "lowarm", "huo", "lowerarmproximal"),
+    "shoulder": ("sjc", "arm", "upperarm", "uparm", "uarm", "shldr", "shldrbend", "shoulder", "clo", "upperarmproximal"),
+    "elbow": ("ejc", "elbow", "forearm", "farm", "forearmbend", "lowerarm", "lowarm", "huo", "lowerarmproximal"),
     "wrist": ("wjc", "wrist", "hand", "rao", "lowerarmdistal"),
     "hand": ("handmiddle1", "hand", "fingerbase", "middle1", "mid1", "hno"),
     "hip": ("hjc", "upleg", "upperleg", "thigh", "thighbend", "hip", "fep", "upperlegproximal"),
