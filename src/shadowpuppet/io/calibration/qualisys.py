@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from unicodedata import normalize
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration._xml import Entry, entries, tree_of
 from shadowpuppet.io.calibration.draft import Draft, Drafts
+from shadowpuppet.names import composed
 from shadowpuppet.video import FILM_SUFFIXES
 
 SUBPIXELS = 64
@@ -31,7 +31,7 @@ def read_qualisys(path: Path) -> Drafts:
     if there is neither. Raises `CalibrationError`."""
     cameras = [entry for entry in entries(path, tree_of(path), ".//cameras/camera", "serial") if entry.element.get("active", "1") != "0"]
     there = _filmed(path)
-    films = [entry for entry in cameras if normalize("NFC", entry.camera) in there or FOR_FILMS.search(entry.element.get("model", ""))]
+    films = [entry for entry in cameras if composed(entry.camera) in there or FOR_FILMS.search(entry.element.get("model", ""))]
     used = films or cameras
     if not used:
         raise CalibrationError(f"{path}: no active camera in it, expected <cameras> with a <camera> each")
@@ -51,7 +51,7 @@ def _filmed(path: Path) -> set[str]:
         inside = list(place.iterdir()) if place.is_dir() else []
         names |= {each.stem for each in inside if each.suffix.lower() in FILM_SUFFIXES}
         names |= {each.name for each in inside if place != folder and each.is_dir()}
-    return {normalize("NFC", name) for name in names}
+    return set(map(composed, names))
 
 
 def _draft(entry: Entry) -> Draft:

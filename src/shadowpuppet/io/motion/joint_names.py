@@ -13,6 +13,7 @@ from shadowpuppet.errors import FormatError
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.names import composed
 
 JOINTS = tuple(dict.fromkeys(joint for bone in BONES for joint in bone))
 """Our names."""
@@ -80,12 +81,13 @@ def read_names(path: str | Path) -> dict[str, str]:
 def with_names(names: Sequence[str], given: Mapping[str, str]) -> tuple[str, ...]:
     """A file's names, with ours where `given` (by ours) has them; another joint of that name gets a number. Raises `FormatError` if a name
     that is given is not there."""
-    missing = [theirs for theirs in given.values() if theirs not in names]
+    there = set(map(composed, names))
+    missing = [theirs for theirs in given.values() if composed(theirs) not in there]
     if missing:
         raise FormatError(f"names: found {shorten(missing[:1], 60)!r}, which is no joint of the file; there are: {shorten(names, 400)}")
-    ours = {theirs: name for name, theirs in given.items()}
+    ours = {composed(theirs): name for name, theirs in given.items()}
     taken = {name for name in given if given[name] != name}
-    return tuple(ours.get(name, f"{name}#2" if name in taken else name) for name in names)
+    return tuple(ours.get(composed(name), f"{name}#2" if name in taken else name) for name in names)
 
 
 def renamed(table: JointTable) -> JointTable:
