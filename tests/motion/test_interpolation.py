@@ -38,6 +38,11 @@ def test_a_rate_that_is_another_stays(rate):
     assert rate_of(np.round(np.arange(100) / rate, 5)) == pytest.approx(rate, rel=1e-5)
 
 
+@pytest.mark.parametrize("times", [[0.0, 1e-300, 2e-300], [0.0, 1e300, 2e300], [-1e305, 0.0, 1e305]])
+def test_impossible_times_have_a_rate(times):
+    assert rate_of(times) > 0
+
+
 def test_missing_frames_are_places_without_a_frame():
     kept = np.delete(np.arange(50), [5, 6, 7, 30])
     found = uniform_sampling(kept / 25)

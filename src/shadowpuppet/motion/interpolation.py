@@ -64,9 +64,12 @@ def rate_of(times: ArrayLike) -> float:
         return _rounded(1 / float(np.median(np.diff(np.asarray(times, float)))))
 
 
+@np.errstate(over="ignore")
 def _nominal(times: Array, numbers: Array, rate: float) -> float:
     """The rate that a camera states (30, 29.97, 12.5) if frames of these `numbers` (T,) have it within the rounding of their times (T,);
     else `rate`, the fitted one."""
+    if not np.isfinite([2 * rate, 1e9 * times[-1], 1e9 * times[0]]).all():
+        return rate
     if abs(2 * rate - round(2 * rate)) < 1e-6 * rate:
         return round(2 * rate) / 2
     digits = next((n for n in range(9) if np.abs(times.round(n) - times).max() < ROUNDED_TIME), 9)
