@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.motion.interpolation import filled, true_runs, uniform_sampling
+from shadowpuppet.motion.interpolation import filled, rate_of, true_runs, uniform_sampling
 
 
 @pytest.mark.parametrize("rate", [23.976, 25, 29.97, 60, 119.88, 1000])
@@ -18,6 +18,29 @@ def test_a_films_times_rounded_to_milliseconds_have_its_rate(rate):
     found = uniform_sampling(np.round(np.arange(500) / rate, 3 if rate < 500 else 6) + 7.25)
     assert found.rate == pytest.approx(rate, rel=2e-4)
     np.testing.assert_array_equal(found.frames, np.arange(500))
+
+
+@pytest.mark.parametrize(("digits", "frames"), [(3, 61), (3, 500), (5, 2), (5, 3), (5, 61), (9, 500)])
+@pytest.mark.parametrize("rate", [10, 12.5, 24, 25, 30, 50, 60, 120])
+def test_the_rate_is_the_nominal_one_if_the_times_are_its_own_but_for_rounding(rate, frames, digits):
+    assert rate_of(np.round(np.arange(frames) / rate + 4.0, digits)) == rate
+    assert rate_of(np.floor(np.arange(frames) / rate * 10**digits + 1e-6) / 10**digits) == rate
+
+
+@pytest.mark.parametrize("digits", [3, 5, 9])
+@pytest.mark.parametrize(("rate", "written"), [(24000 / 1001, "23.976"), (30000 / 1001, "29.97"), (60000 / 1001, "59.9401")])
+def test_ntscs_rates_stay(rate, written, digits):
+    assert f"{rate_of(np.round(np.arange(150) / rate, digits)):.6g}" == written
+
+
+@pytest.mark.parametrize("rate", [30.4, 29.5, 31.25, 7.3])
+def test_a_rate_that_is_another_stays(rate):
+    assert rate_of(np.round(np.arange(100) / rate, 5)) == pytest.approx(rate, rel=1e-5)
+
+
+@pytest.mark.parametrize("times", [[0.0, 1e-300, 2e-300], [0.0, 1e300, 2e300], [-1e305, 0.0, 1e305]])
+def test_impossible_times_have_a_rate(times):
+    assert rate_of(times) > 0
 
 
 def test_missing_frames_are_places_without_a_frame():

@@ -23,6 +23,7 @@ from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.io.recording import BOARD_FOLDERS
+from shadowpuppet.names import composed
 
 MAX_RMS = 1.0
 """Greatest reprojection error, pixels of a picture 1000 wide, that is not remarked on."""
@@ -101,7 +102,7 @@ def _starts(table: object, path: Path) -> dict[str, float]:
     for name, value in table.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value) or abs(value) > 1e5:
             raise CalibrationError(f"{path}: start.{name}: found {value!r}, expected seconds")
-    return {str(name): float(value) for name, value in table.items()}
+    return {composed(str(name)): float(value) for name, value in table.items()}
 
 
 def calibrate(session: Session, lenses: Mapping[str, Camera] | None = None, say: Callable[[str, int], None] = lambda what, count: None,
@@ -110,7 +111,7 @@ def calibrate(session: Session, lenses: Mapping[str, Camera] | None = None, say:
 
     lenses: cameras whose lenses are known, by name: not solved again. say, advance: progress: a phase with its number of steps; one step.
     """
-    board, given = session.board, dict(lenses or {})
+    board, given = session.board, {composed(name): camera for name, camera in (lenses or {}).items()}
     say("films of the carried board", len(session.films["extrinsics"]))
     carried = read_films(session.films["extrinsics"], board, session.starts, True, advance)
     say("films of the floor", len(session.films["floor"]))

@@ -74,9 +74,10 @@ def _span(scene: Scene, start: str | None, end: str | None) -> tuple[float | Non
     """Seconds at which the part to be shown begins and ends; None for the scene's own."""
     import numpy as np
 
+    from shadowpuppet.motion.interpolation import rate_of
     from shadowpuppet.video.moments import span_of
 
-    rate = 1 / float(np.median(np.diff(scene.times))) if len(scene.times) > 1 else np.nan
+    rate = rate_of(scene.times) if len(scene.times) > 1 else np.nan
     begin, stop = span_of(start, end, rate, np.inf)
     return (None if start is None else begin), (None if end is None else stop)
 

@@ -20,6 +20,7 @@ from shadowpuppet.body.sizes import HEIGHTS, is_within
 from shadowpuppet.errors import RecordingError, choices
 from shadowpuppet.io.calibration.formats import find_calibration
 from shadowpuppet.io.files.text import read_limited, read_toml
+from shadowpuppet.names import composed
 from shadowpuppet.video import FILM_SUFFIXES
 
 LEVELS = 2
@@ -62,10 +63,11 @@ def find_project(path: Path) -> Project | None:
 
 def sources_in(folder: Path, suffixes: tuple[str, ...]) -> dict[str, list[Path]]:
     """Files with some endings, and folders, in a folder, by name without ending, sorted."""
-    found: dict[str, list[Path]] = {}
+    found, spelling = dict[str, list[Path]](), dict[str, str]()
     for path in sorted(folder.iterdir()) if folder.is_dir() else []:
         if path.name[0] != "." and (path.is_dir() or path.suffix.lower() in suffixes):
-            found.setdefault(path.name if path.is_dir() else path.stem, []).append(path)
+            name = path.name if path.is_dir() else path.stem
+            found.setdefault(spelling.setdefault(composed(name), name), []).append(path)
     return found
 
 

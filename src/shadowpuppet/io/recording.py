@@ -17,6 +17,7 @@ from shadowpuppet.io.calibration.formats import find_calibration
 from shadowpuppet.io.picture_sizes import check_sizes, without_padding
 from shadowpuppet.io.projects import Project, films_in, find_project, sources_in
 from shadowpuppet.io.recording_toml import RecordingNotes
+from shadowpuppet.names import composed, spelled_as
 from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES, camera_number, open_frames
 
 POSTURES = ("front_t_pose", "side_arms_hanging", "front_arms_t_pose")
@@ -129,7 +130,7 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
             raise RecordingError(f"{folder}: found a picture, expected a film, or the folder with a film's pictures")
         open_frames(folder)  # raises for a file that is no film, before the calibration is read
     cameras = _cameras(folder, {folder.stem: source}, fov, calibration)
-    named = [c for c in cameras if c.name == folder.stem or len(cameras) == 1]
+    named = [c for c in cameras if composed(c.name) == composed(folder.stem) or len(cameras) == 1]
     if not named:
         raise RecordingError(f"{calibration}: found no camera {folder.stem!r}, after the film's name; cameras there: "
                              f"{choices(c.name for c in cameras)}")
@@ -195,6 +196,7 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
     cameras = _cameras(folder, films, fov, calibration, notes)
     if project is not None:
         cameras = _in_order(cameras, films, project)
+    films, backgrounds, masks = (spelled_as(each, [c.name for c in cameras]) for each in (films, backgrounds, masks))
     for kind, sources in (("video", films), ("background", backgrounds), ("masks", masks)):
         _check_names(folder / kind if (folder / kind).is_dir() else folder, sources, cameras, asked, kind)
     missing = [c.name for c in cameras if c.name not in films]
@@ -218,7 +220,7 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
 
 def _in_order(cameras: tuple[Camera, ...], films: dict[str, Any], project: Project) -> tuple[Camera, ...]:
     """The cameras under the films' names: these programs pair the two by order where names differ."""
-    if set(films) <= {camera.name for camera in cameras} or len(films) != len(cameras):
+    if set(map(composed, films)) <= {composed(camera.name) for camera in cameras} or len(films) != len(cameras):
         return cameras
     named = tuple(replace(camera, name=name) for camera, name in zip(cameras, films))
     warn(f"{project.folder}: films and calibration have other names of cameras, and are paired by order, as {project.program} does: "
@@ -245,8 +247,9 @@ def _truths(folder: Path) -> tuple[Path, ...]:
 
 def _starts(notes: RecordingNotes, cameras: Iterable[Camera], asked: Sequence[str] | None) -> dict[str, float]:
     """`View.start` by camera, from recording.toml."""
-    _check_names(notes.path, notes.table("start"), cameras, asked)
     found = {name: notes.number(name, STARTS, "seconds", "start") for name in notes.table("start")}
+    found = spelled_as(found, [camera.name for camera in cameras])
+    _check_names(notes.path, found, cameras, asked)
     return {name: start for name, start in found.items() if start is not None}
 
 
@@ -260,7 +263,7 @@ def _sources(folder: Path, kind: str, notes: RecordingNotes) -> dict[str, Any]:
     found = sources_in(folder / kind, FILM_SUFFIXES if kind == "video" else FILM_SUFFIXES + IMAGE_SUFFIXES)
     if kind == "video" and not found and not sources:
         found = films_in(folder)  # films lie in a recording's folder itself in many laboratories
-    return {name: _only(paths) for name, paths in found.items() if name not in sources} | sources
+    return {name: _only(paths) for name, paths in spelled_as(found, sources).items() if name not in sources} | sources
 
 
 def _only(paths: list[Path]) -> Path:
@@ -275,7 +278,8 @@ def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration
         raise RecordingError(f"{folder}: found a field of view and a calibration ({calibration.name}), expected one of them")
     if calibration is not None:
         def size(name: str) -> tuple[int, int] | None:
-            return open_frames(films[name]).size if name in films and camera_number(films[name]) is None else None
+            film = spelled_as(films, [name]).get(name)
+            return open_frames(film).size if film is not None and camera_number(film) is None else None
 
         told = {key: notes.choice(key, known) for key, known in (("unit", UNITS), ("up", UPS))} if notes else {}
         return read_calibration(calibration, sizes=size, **told)
@@ -294,8 +298,8 @@ def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration
 
 def _check_names(place: Path, sources: Iterable[str], cameras: Iterable[Camera], asked: Sequence[str] | None, kind: str = "") -> None:
     """Raise `RecordingError` if there is something of a camera that the calibration does not know, and that is `asked` for (None: all)."""
-    known = [camera.name for camera in cameras]
-    unknown = sorted(name for name in set(sources) - set(known) if asked is None or name in asked)
+    known, used = [camera.name for camera in cameras], None if asked is None else set(map(composed, asked))
+    unknown = sorted(name for name in set(sources) - set(known) if used is None or composed(name) in used)
     if unknown:
         found = f"{place}: found {choices(unknown)}, but the calibration knows no such camera; cameras known: {choices(known)}"
         if kind == "video":

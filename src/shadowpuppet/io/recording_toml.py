@@ -10,6 +10,7 @@ from typing import Any
 from shadowpuppet.body.sizes import expected_metres, is_within
 from shadowpuppet.errors import RecordingError, choices
 from shadowpuppet.io.files.text import read_toml
+from shadowpuppet.names import composed
 from shadowpuppet.video import camera_number
 
 KEYS = ("subject", "rate", "duration", "calibration", "unit", "up", "truth", "training", "start", "video", "background", "masks")
@@ -66,7 +67,16 @@ class RecordingNotes:
         return value if live and kind == "video" else self._existing(f"{kind}.{camera}", value)
 
     def _existing(self, key: str, value: object) -> Path:
-        path = self.folder / value if isinstance(value, str) else None
+        path = _spelled_as_there(self.folder / value) if isinstance(value, str) else None
         if path is None or not os.path.exists(path):  # unlike that of `Path`, false for an impossible name
             raise RecordingError(f"{self.path}: {key}: found {value!r}, expected the path of an existing file, from this folder")
         return path
+
+
+def _spelled_as_there(path: Path) -> Path:
+    """The path of an existing file whose name, or a folder's above it, may be composed in another way; the same path if there is none."""
+    if os.path.exists(path) or path.parent == path:
+        return path
+    folder = _spelled_as_there(path.parent)
+    inside = folder.iterdir() if os.path.isdir(folder) else ()
+    return next((each for each in inside if composed(each.name) == composed(path.name)), path)

@@ -15,6 +15,10 @@ FRAME_TOLERANCE = 0.2
 """Share of a step by which a frame may lie off a uniform time: films' times are rounded to milliseconds, cameras' jitter."""
 MAX_FRAMES = 10_000_000
 """Upper bound of the number of frames."""
+ROUNDED_TIME = 1e-9
+"""Greatest error of a number for a time, seconds."""
+MOST_ROUNDED = 0.02
+"""Greatest share by which a fitted rate may differ from the nominal one: two times of a film rounded to milliseconds have 1%."""
 SINGLE_FRAME_RATE = 30.0
 """Rate (frames/s) of a single frame."""
 
@@ -47,9 +51,32 @@ def uniform_sampling(times: ArrayLike) -> UniformSampling:
     if (np.diff(numbers) > 0).all() and (np.abs(start + slope * numbers - times) <= FRAME_TOLERANCE * slope).all():
         frames = np.full(int(numbers[-1]) + 1, -1)
         frames[numbers.astype(int)] = np.arange(len(times))
-        return UniformSampling(_rounded(1 / slope), times[0] + slope * np.arange(len(frames)), frames)
+        return UniformSampling(_rounded(_nominal(times, numbers, float(1 / slope))), times[0] + slope * np.arange(len(frames)), frames)
     count = int((times[-1] - times[0]) / step + 1 + FRAME_TOLERANCE)
     return UniformSampling(_rounded(1 / step), np.minimum(times[0] + step * np.arange(count), times[-1]), None)
+
+
+def rate_of(times: ArrayLike) -> float:
+    """Frames/s of frames at times (T,), seconds, T at least 2: of uniform times, some possibly without a frame, else by the median step."""
+    try:
+        return uniform_sampling(times).rate
+    except ShadowPuppetError:
+        return _rounded(1 / float(np.median(np.diff(np.asarray(times, float)))))
+
+
+@np.errstate(over="ignore")
+def _nominal(times: Array, numbers: Array, rate: float) -> float:
+    """The rate that a camera states (30, 29.97, 12.5) if frames of these `numbers` (T,) have it within the rounding of their times (T,);
+    else `rate`, the fitted one."""
+    if not np.isfinite([2 * rate, 1e9 * times[-1], 1e9 * times[0]]).all():
+        return rate
+    if abs(2 * rate - round(2 * rate)) < 1e-6 * rate:
+        return round(2 * rate) / 2
+    digits = next((n for n in range(9) if np.abs(times.round(n) - times).max() < ROUNDED_TIME), 9)
+    for candidate in (float(round(rate)), round(rate * 1.001) / 1.001):  # 1.001: of NTSC's films
+        if candidate and abs(candidate / rate - 1) < MOST_ROUNDED and np.ptp(times - numbers / candidate) <= 10.0**-digits + ROUNDED_TIME:
+            return candidate
+    return rate
 
 
 def _rounded(rate: float) -> float:

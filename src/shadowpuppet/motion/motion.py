@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import limbs_of
+from shadowpuppet.names import composed
 
 STATUSES = ("tracked", "uncertain", "predicted", "lost", "absent")
 """Statuses of a frame: tracked; tracked but doubtful; extrapolated without a picture; position unknown; no person visible."""
@@ -43,10 +44,11 @@ class JointTable:
 
     def select(self, names: Sequence[str]) -> JointTable:
         """The table with these joints only. Raises `ShadowPuppetError` with the names that exist."""
-        missing = [name for name in names if name not in self.names]
+        places = {composed(name): n for n, name in enumerate(self.names)}
+        missing = [name for name in names if composed(name) not in places]
         if missing:
             raise ShadowPuppetError(f"unknown joint {missing[0]!r}; there are: {choices(self.names)}")
-        return JointTable(self.times, tuple(names), self.positions[:, [self.names.index(name) for name in names]])
+        return JointTable(self.times, tuple(names), self.positions[:, [places[composed(name)] for name in names]])
 
     def between(self, begin: float, end: float) -> JointTable:
         """The frames from `begin` on and before `end`, seconds."""
@@ -248,7 +250,8 @@ def _set(target: object, **values: object) -> None:
 def _names(what: str, names: Iterable[str]) -> tuple[str, ...]:
     """Checked names of table columns."""
     names = tuple(str(name) for name in names)
-    bad = [name for i, name in enumerate(names) if name != name.strip() or not name or name.endswith("_sd") or name in names[:i]]
+    forms = [*map(composed, names)]
+    bad = [name for i, name in enumerate(names) if name != name.strip() or not name or name.endswith("_sd") or forms[i] in forms[:i]]
     if bad:
         raise ShadowPuppetError(f"names of {what}: found {bad[0]!r}, expected words, each once, none ending in _sd (that is for "
                                 "standard deviations)")

@@ -17,6 +17,7 @@ from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, 
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.picture_sizes import differ_by_padding
 from shadowpuppet.io.recording import Recording, View, read_recording
+from shadowpuppet.names import composed
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video import FrameSource, Image, camera_number, fitted, open_frames
 from shadowpuppet.video.frames import ROUNDING, Wanted
@@ -188,8 +189,8 @@ def names_in(text: str) -> list[str]:
 
 def chosen_views(recording: Recording, names: str | None) -> tuple[View, ...]:
     """Views of the cameras `names` (separated by commas), or all. Raises `RecordingError` for unknown or repeated names."""
-    views = {view.camera.name: view for view in recording.views}
-    asked = list(views) if names is None else names_in(names)
+    views = {composed(view.camera.name): view for view in recording.views}
+    asked = list(views) if names is None else [*map(composed, names_in(names))]
     for name in asked:
         if name not in views or asked.count(name) > 1:
             raise RecordingError(f"{recording.path}: camera: found {names!r}, expected one of {choices(views)}; or some, each once, "

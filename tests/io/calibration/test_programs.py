@@ -114,6 +114,28 @@ def test_cameras_that_are_not_to_be_used_are_left_out_and_named(files):
     assert examine_calibration(files["session.xcp"]).notes == ("cameras for markers are left out: 999", "not calibrated, left out: 77")
 
 
+@pytest.mark.parametrize(("calibration", "film"), [
+    ("Calib.qca.txt", "marker.avi"), ("Calib.qca.txt", "video/marker.mp4"), ("calibration/Calib.qca.txt", "video/marker.mp4"),
+    ("Calib.qca.txt", "video/marker/1.png"),
+])  # fmt: skip
+def test_a_camera_of_qualisys_that_filmed_is_one_for_films(tmp_path, made, calibration, film):
+    """Whatever its model is."""
+    (tmp_path / calibration).parent.mkdir(exist_ok=True)
+    (tmp_path / calibration).write_text(calibrations.qualisys(made))
+    assert "marker" not in {camera.name for camera in examine_calibration(tmp_path / calibration).cameras}
+    (tmp_path / film).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / film).write_bytes(b"")
+    found = examine_calibration(tmp_path / calibration)
+    assert [camera.name for camera in found.cameras] == [*(camera.name for camera in made), "marker"]
+    assert not found.notes
+
+
+def test_hybrid_cameras_of_qualisys_make_films(tmp_path, made):
+    text = calibrations.qualisys(made).replace("Oqus 400", "Miqus Hybrid")
+    (tmp_path / "Calib.qca.txt").write_text(text)
+    assert [camera.name for camera in examine_calibration(tmp_path / "Calib.qca.txt").cameras][-1] == "marker"
+
+
 def test_caliscope_without_places_is_said(tmp_path):
     path = tmp_path / "camera_array.toml"
     path.write_text("[cameras.0]\ncam_id = 0\nsize = [640, 480]\n")

@@ -130,6 +130,8 @@ BAD_AMC = [
     (lambda t: t.replace("\n2\n", "\n"), "'root' is there twice in the frame"),
     (lambda t: t.replace("head ", "head nan ", 1).replace("head nan ", "head nan 1 2 #"), "expected head and 3 numbers"),
     (lambda t: t[: t.index("head ")] + "head nan 1 2" + t[t.index("\n", t.index("head ")) :], "found 'head, nan, 1, 2', expected head"),
+    (lambda t: t[: t.index("head ")] + "head 0,5 1 2" + t[t.index("\n", t.index("head ")) :],
+     r"line \d+, number 1: found '0,5', expected head and 3 numbers, with a decimal point: 0\.5$"),
     (lambda t: ":DEGREES\n", "found no frames"),
     (lambda t: "", "the file is empty"),
     (lambda t: "hello\n" + t, "line 1: found 'hello', expected a frame's number"),
@@ -148,6 +150,7 @@ def test_malformed_motions_are_reported_by_line(tmp_path, break_, words):
 
 BAD_ASF = [
     (lambda t: t.replace("length 7.4", "length long"), r"line \d+: found 'long', expected 1 number"),
+    (lambda t: t.replace("length 7.4", "length 7,4"), r"line \d+: found '7,4', expected 1 number, with a decimal point: 7\.4$"),
     (lambda t: t.replace("    name lfemur\n", ""), "a bone without name"),
     (lambda t: t.replace("direction 0.0 1.0 -0.0", "direction 0 0 0", 1), "direction of lowerback: found 0 0 0"),
     (lambda t: t.replace("dof rx ry rz", "dof rx ry l", 1), "dof of lowerback: found 'rx, ry, l'"),

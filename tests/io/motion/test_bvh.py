@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from shadowpuppet.errors import FormatError, ShadowPuppetWarning
 from shadowpuppet.io.motion.bvh import read_bvh
+from shadowpuppet.io.motion.motion_files import read_motion
 
 TEXT = """HIERARCHY
 ROOT Hips
@@ -138,6 +139,50 @@ def test_one_file_has_one_kind_of_positions(tmp_path, added):
 
 def test_joints_of_one_name_are_distinguished(tmp_path):
     assert read(tmp_path, TEXT.replace("Knee", "Hips")).joints().names == ("Hips", "Hips#2", "Hips_end")
+
+
+@pytest.mark.parametrize("layout", ["JOINT {}\n", "JOINT   {}  {{ ", "joint\t{}\t\n", "JOINT {}{{\n"])
+@pytest.mark.parametrize("name", ["Bip01 L Thigh", "Joint of the Root", "left  knee 2", "größe"])
+def test_a_name_is_the_rest_of_its_line(tmp_path, layout, name):
+    there = "  JOINT Knee\n  {\n"
+    assert there in TEXT
+    text = TEXT.replace(there, layout.format(name) + ("" if "{{" in layout else "{\n")).replace("ROOT Hips", "ROOT The Hips")
+    table = read(tmp_path, text).joints()
+    assert table.names == ("The Hips", name, f"{name}_end")
+    np.testing.assert_array_equal(table.positions, read(tmp_path, TEXT).joints().positions)
+
+
+@pytest.mark.filterwarnings("ignore:.*points up there:shadowpuppet.errors.ShadowPuppetWarning")
+def test_names_with_blanks_are_known_as_those_without(tmp_path):
+    plain = person(3)
+    spaced = plain.replace("JOINT LeftUpLeg", "JOINT Bip01 L Thigh").replace("JOINT RightUpLeg", "JOINT Bip01 R Thigh")
+    assert spaced.count("Thigh") == 2
+    (tmp_path / "plain.bvh").write_text(plain)
+    (tmp_path / "spaced.bvh").write_text(spaced)
+    found, wanted = (read_motion(tmp_path / f"{name}.bvh", unit=0.01) for name in ("spaced", "plain"))
+    assert found.names == wanted.names
+    np.testing.assert_array_equal(found.positions, wanted.positions)
+
+
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ("10 20 30 0 0 90 90", "10 20 30 0 0 90,5 90,5", "line 20, number 6: found '90,5', expected numbers, with a decimal point: 90.5"),
+    ("OFFSET 0.0 -2.0 0.0", "OFFSET 0,0 -2,0 0,0", "line 8: found '0,0 -2,0 0,0', expected 3 numbers, with a decimal point: 0.0"),
+    ("Frame Time: 0.05", "Frame Time: 0,05", "line 18: found 'Frame Time: 0,05', expected Frame Time: and a number more than zero, with a "
+                                             "decimal point: 0.05"),
+])  # fmt: skip
+def test_a_decimal_comma_is_named(tmp_path, old, new, said):
+    assert old in TEXT
+    with pytest.raises(FormatError) as found:
+        read(tmp_path, TEXT.replace(old, new))
+    assert str(found.value).endswith(f"walk.bvh: {said}")
+
+
+@pytest.mark.parametrize(("said", "step"), [
+    ("0.033333", 1 / 30), ("0.0333", 1 / 30), ("0.033", 1 / 30), ("0.0083333", 1 / 120), ("0.0333667", 1001 / 30000), ("0.05", 0.05),
+    ("0.03", 0.03), ("0.0329", 0.0329), ("1.5", 1.5), ("2", 2.0), ("3.3e-2", 0.033),
+])  # fmt: skip
+def test_a_rounded_time_per_frame_is_that_of_the_rate(tmp_path, said, step):
+    assert read(tmp_path, TEXT.replace("0.05", said)).step == pytest.approx(step, rel=1e-12)
 
 
 @pytest.mark.parametrize(("old", "new", "said"), [

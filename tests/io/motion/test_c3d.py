@@ -97,6 +97,34 @@ def test_long_recordings_tell_their_frames_in_32_bits(tmp_path):
         assert table.positions[-1, 0, 0] == pytest.approx(70.0)
 
 
+@pytest.mark.parametrize("points", [1, 2, 9])
+@pytest.mark.parametrize("padded", [False, True])
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_long_recordings_that_do_not_tell_their_frames_have_those_of_the_files_length(tmp_path, points, padded, wrapped):
+    """The header ends at 65,535, or counts from 0 again."""
+    places = np.ones((70_001, points, 3)) * np.arange(1, 70_002)[:, None, None]
+    content = bytearray(c3d([f"P{n}" for n in range(points)], places))
+    if wrapped:
+        content[8:10] = (70_001 - 65_536).to_bytes(2, "little")
+    content += bytes(-len(content) % 512) if padded else b""
+    with pytest.warns(ShadowPuppetWarning, match=r"16 bits state \d+ frames, but the file has 70001 by its length; those are used"):
+        table = read(tmp_path, bytes(content))
+    assert len(table.times) == 70_001
+    assert table.positions[-1, 0, 0] == pytest.approx(70.001)
+
+
+def test_frames_as_a_float_are_believed_over_16_bits(tmp_path):
+    content = c3d(["A"], np.ones((70_000, 1, 3)), parameters=[("POINT", "FRAMES", 69_999.0)])
+    assert len(read(tmp_path, content).times) == 69_999
+
+
+def test_a_header_that_states_fewer_frames_than_the_file_has_is_believed_below_its_limit(tmp_path):
+    content = bytearray(c3d(["A"], np.ones((90, 1, 3))))
+    content[8:10] = (60).to_bytes(2, "little")
+    assert len(read(tmp_path, bytes(content)).times) == 60
+    assert len(read(tmp_path, c3d(["A"], np.ones((65_535, 1, 3)))).times) == 65_535
+
+
 @pytest.mark.parametrize("processor", [INTEL, MIPS])
 def test_where_the_parameters_do_not_say_where_the_data_begin_the_header_does(tmp_path, processor):
     content = bytearray(c3d(NAMES, PLACES, processor=processor))

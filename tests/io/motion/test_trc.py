@@ -106,6 +106,8 @@ def test_gaps_are_dropped_or_filled_where_that_is_asked(tmp_path):
     ("neck\t\t\tleft_hand\t\t", "\t\t\t\t\t", "line 4: found .* expected a marker's name in every third column"),
     ("left_hand", "neck", "names of joints: found 'neck'"),
     ("\t20\t", "\ttwenty\t", "line 7, column 'neck Y': found 'twenty', expected a number or nothing"),
+    ("\t20\t", "\t20,5\t", "line 7, column 'neck Y': found '20,5', expected a number or nothing, with a decimal point: 20.5"),
+    ("2\t0.5", "2\t0,5", "line 8, column 'Time': found '0,5', expected a number or nothing, with a decimal point: 0.5"),
     ("\t1e3\n", "\n", "line 7: found 7 cells, expected 8 for 2 markers"),
     ("\t1e3\n", "\t1e3\t7\n", "line 7: found 9 cells"),
     ("0.5", "0.0", "line 8, column 'time': found 0, expected more than the 0"),
@@ -115,6 +117,14 @@ def test_what_is_malformed_is_said(tmp_path, old, new, said):
     assert old in TEXT
     with pytest.raises(FormatError, match=rf"truth\.trc: {said}"):
         read(tmp_path, TEXT.replace(old, new))
+
+
+def test_the_nominal_rate_is_written_and_the_times_are_read(tmp_path):
+    times = np.round(np.arange(61) / 30, 5)  # whose steps have a median of 1/30.003
+    write_trc(tmp_path / "truth.trc", JointTable(times, ("neck",), np.zeros((61, 1, 3))))
+    text = (tmp_path / "truth.trc").read_text()
+    assert text.splitlines()[2] == "30\t30\t61\t1\tmm\t30\t1\t61"
+    np.testing.assert_array_equal(read(tmp_path, text.replace("\n30\t30\t", "\n29\t29\t")).times, times)
 
 
 def test_another_number_of_frames_than_said_is_warned_of(tmp_path):

@@ -14,6 +14,7 @@ from shadowpuppet.calibration.boards.board import Board
 from shadowpuppet.calibration.boards.detection import BoardDetector, View
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, evenly_spread
+from shadowpuppet.names import composed
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.video.container import FILM_SUFFIXES, opened
 from shadowpuppet.video.images import IMAGE_SUFFIXES, read_image
@@ -56,7 +57,7 @@ def films_in(folder: Path) -> dict[str, Path]:
         pictures = path.is_dir() and any(file.suffix.lower() in IMAGE_SUFFIXES for file in path.iterdir())
         if path.name.startswith(".") or not (pictures or path.suffix.lower() in (*FILM_SUFFIXES, *IMAGE_SUFFIXES)):
             continue
-        name = path.name if path.is_dir() else path.stem
+        name = composed(path.name if path.is_dir() else path.stem)
         if name in out:
             raise CalibrationError(f"{folder}: found {choices([out[name].name, path.name])} for the camera {name!r}, expected one of them")
         out[name] = path

@@ -28,6 +28,8 @@ SEPARATORS = {";": "semicolons", "\t": "tabs"}
 """Signs with which other programs separate columns."""
 FORMULA = re.compile(r"'*[=+\-@\t\r\n\uff0b\uff0d\uff1d\uff20]")
 """Beginning of a cell that a spreadsheet may take for a formula, with the apostrophes before it."""
+COMMA = re.compile(r"[+-]?\d*,\d+(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
+"""A number with a decimal comma, as programs of many countries write it."""
 NUMBER = re.compile(r"-?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|-?(inf|nan)")
 
 
@@ -93,6 +95,11 @@ class _Lines:
         return self.text[begin : self.at]
 
 
+def lines_of(text: str) -> Iterator[str]:
+    """The lines of a text, with their ends, for a reader of CSV."""
+    return _Lines(text)
+
+
 def number(path: Path, line: int, column: str, cell: str) -> float:
     """The number in a cell; NaN if it is empty. Raises `FormatError` naming line and column."""
     try:
@@ -100,8 +107,14 @@ def number(path: Path, line: int, column: str, cell: str) -> float:
     except ValueError:
         value = np.inf
     if value in (np.inf, -np.inf):
-        raise FormatError(f"{path}: line {line}, column {column!r}: found {shorten([cell])!r}, expected a number or nothing")
+        raise FormatError(f"{path}: line {line}, column {column!r}: found {shorten([cell])!r}, expected a number or nothing"
+                          f"{with_point(cell)}")
     return value
+
+
+def with_point(cell: str) -> str:
+    """The end of a message about a cell that is no number: the decimal sign that is expected, if the cell has a decimal comma."""
+    return f", with a decimal point: {cell.strip().replace(',', '.')}" if COMMA.fullmatch(cell.strip()[:60]) else ""
 
 
 def check_times(path: Path, times: Array, lines: Sequence[int] | NDArray[np.int64]) -> None:
@@ -120,8 +133,11 @@ def read_table(path: Path, cut: bool = False) -> Table:
     `cut`: ignore a last line without a line end, as the writer may have been killed.
     """
     text = read_text(path)
-    if cut:
-        text = text[: text.rfind("\n") + 1]
+    return table_of(path, text[: text.rfind("\n") + 1] if cut else text)
+
+
+def table_of(path: Path, text: str) -> Table:
+    """The table in the text of a file, as `read_table` returns it."""
     columns, begins, numbers, begin = None, array("q"), array("q"), 0
     reader = csv.reader(lines := _Lines(text))
     try:

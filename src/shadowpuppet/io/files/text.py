@@ -1,7 +1,8 @@
-"""Reads text and TOML files; writes files completely or not at all."""
+"""Reads text and TOML files, UTF-8 or UTF-16 with its mark; writes files completely or not at all."""
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import os
 import re
@@ -17,13 +18,18 @@ TEXT_LIMIT = 1_000_000_000
 TOML_LIMIT = 2_000_000
 """Greatest size of a calibration or settings file, bytes: what is longer takes many seconds to be parsed, or is a film given by mistake."""
 
+MARKS = {codecs.BOM_UTF32_LE: "utf-32", codecs.BOM_UTF32_BE: "utf-32", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+"""Encodings by the first bytes of a file, longer marks first; UTF-8 has its mark or none."""
+UNMARKED = re.compile(rb"[^\0]\0[^\0]\0|\0[^\0]\0[^\0]|[^\0]\0\0\0|\0\0\0[^\0]")
+"""First four bytes of a text in UTF-16 or UTF-32 without a mark."""
+
 DEEPEST = 20
 """Greatest number of parts of a dotted key of TOML; the parser's memory grows with the square of them."""
 TOO_DEEP = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST}}}""", re.ASCII)
 
 
 def read_text(path: Path) -> str:
-    """The text of a UTF-8 file. Raises `FormatError` if it cannot be read, is empty, too long or no text."""
+    """The text of a file. Raises `FormatError` if it cannot be read, is empty, too long or no text."""
     text = read_limited(path, TEXT_LIMIT, FormatError, "a text file")
     if "\0" in text:
         raise FormatError(f"{path}: found a zero byte at position {text.index(chr(0))}, expected a text file")
@@ -45,16 +51,29 @@ def read_toml(path: str | Path, error: type[ShadowPuppetError]) -> dict[str, Any
 
 
 def read_limited(path: Path, limit: int, error: type[ShadowPuppetError], kind: str, kind_if_long: str = "") -> str:
-    """The text of a UTF-8 file of at most `limit` bytes. Raises `error`, which names the `kind` of file that is expected."""
+    """The text of a file of at most `limit` bytes, UTF-8 or UTF-16 with its mark, as Windows' programs write it. Raises `error`, which
+    names the `kind` of file that is expected."""
     try:
         check_regular(path)
         if path.stat().st_size > limit:
             raise error(f"{path}: found {path.stat().st_size} bytes, expected {kind_if_long or kind} of at most {limit}")
-        return path.read_text("utf-8-sig")
+        with path.open("rb") as file:
+            found = encoding_of(file.read(4))
+        if found is None or found == "utf-32":
+            raise error(f"{path}: found text in {'UTF-32' if found else 'UTF-16 or UTF-32 without its mark'}, expected {kind} in UTF-8, or "
+                        "in UTF-16 with its mark (FF FE or FE FF at the beginning): save it as UTF-8")
+        return path.read_text(found)
     except OSError as problem:
         raise error(f"{path}: cannot be read ({reason(problem)})") from None
     except UnicodeDecodeError as problem:
-        raise error(f"{path}: found bytes that are no text at position {problem.start}, expected {kind}") from None
+        what = "no UTF-16" if problem.encoding.startswith("utf-16") else "no text"
+        raise error(f"{path}: found bytes that are {what} at position {problem.start}, expected {kind}") from None
+
+
+def encoding_of(head: bytes) -> str | None:
+    """Python's name of a text's encoding by its first bytes; None for UTF-16 or UTF-32 without a mark."""
+    found = next((name for mark, name in MARKS.items() if head.startswith(mark)), "utf-8-sig")
+    return None if UNMARKED.match(head) else found
 
 
 @contextlib.contextmanager

@@ -14,7 +14,7 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.table import shorten, with_point
 from shadowpuppet.io.files.text import read_text
 from shadowpuppet.io.motion.asf import Skeleton, euler, read_asf
 from shadowpuppet.motion.motion import JointTable
@@ -206,6 +206,8 @@ def _raise_malformed(path: Path, lines: list[str], first: int, names: list[str],
         expected = f"{name} and {count} number{'s' if count != 1 else ''}" if name else "a frame's number"
         right = words[0] == name if name else words[0].isdigit()
         if not right or len(words) != count + 1 or not all(_is_number(word) for word in words[1:]):
-            raise FormatError(f"{path}: line {n}: found {shorten(words)!r}, expected {expected}")
+            point = next(((at, word) for at, word in enumerate(words[1:], 1) if with_point(word)), None)
+            where, what = (f", number {point[0]}", point[1]) if point and right else ("", shorten(words))
+            raise FormatError(f"{path}: line {n}{where}: found {what!r}, expected {expected}{with_point(what)}")
         place = (place + 1) % len(due)
     raise FormatError(f"{path}: line {len(lines)}: the file ends within a frame, expected {due[place][0]}")

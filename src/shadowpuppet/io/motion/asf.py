@@ -10,7 +10,7 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, choices
 from shadowpuppet.geometry import Array, rotation_about
-from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.table import shorten, with_point
 from shadowpuppet.io.files.text import read_text
 
 INCH = 0.0254
@@ -214,4 +214,5 @@ def _numbers(path: Path, line: int, words: Sequence[str], count: int) -> list[fl
             return values
     except ValueError:
         pass
-    raise FormatError(f"{path}: line {line}: found {shorten(words)!r}, expected {count} number{'s' if count > 1 else ''}")
+    raise FormatError(f"{path}: line {line}: found {shorten(words)!r}, expected {count} number{'s' if count > 1 else ''}"
+                      f"{next(filter(None, map(with_point, words[:count])), '')}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,12 +13,14 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, warn
 from shadowpuppet.geometry import Array, rotation_about
-from shadowpuppet.io.files.table import shorten
+from shadowpuppet.io.files.table import shorten, with_point
 from shadowpuppet.io.files.text import errors_named, read_text
 from shadowpuppet.motion.motion import JointTable
 
 CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
 """Kinds of channels; a joint has any of them in any order."""
+NAMED = re.compile(r"(?<!\S)(ROOT|JOINT)(?!\S)\s*([^{}]*)", re.IGNORECASE)
+"""Keyword and name of a joint: the name is the rest of the line, as it may have blanks (`Bip01 L Thigh`)."""
 END = "_end"
 """Suffix of the names of end sites."""
 BLOCK = 100_000
@@ -129,8 +133,7 @@ class _Words:
 
     def __init__(self, path: Path, lines: list[str]) -> None:
         self.path, self.last = path, len(lines)
-        spaced = (line.replace("{", " { ").replace("}", " } ") for line in lines)
-        self._words = iter([(n, word) for n, line in enumerate(spaced, 1) for word in line.split()])
+        self._words = iter([(n, word) for n, line in enumerate(lines, 1) for word in _words(line.replace("{", " { ").replace("}", " } "))])
         self.line = 1
 
     def next(self, *expected: str) -> str:
@@ -150,13 +153,25 @@ class _Words:
         words = [self.next() for _ in range(count)]
         values = _numbers(words)
         if values is None:
-            self.fail(" ".join(words), f"{count} numbers")
+            self.fail(" ".join(words), f"{count} numbers{next(filter(None, map(with_point, words)), '')}")
         return values
 
     def fail(self, found: str, expected: str) -> NoReturn:
         """Raise `FormatError` at the line of the last word."""
         what = f"found {shorten([found])!r}" if found else "the hierarchy ends"
         raise FormatError(f"{self.path}: line {self.line}: {what}{f', expected {expected}' if expected else ''}")
+
+
+def _words(line: str) -> Iterator[str]:
+    """The words of a line of the hierarchy, in which braces are words; a joint's name is one word."""
+    at = 0
+    for found in NAMED.finditer(line):
+        yield from line[at : found.start()].split()
+        yield found[1]
+        if name := found[2].strip():
+            yield name
+        at = found.end()
+    yield from line[at:].split()
 
 
 def _hierarchy(words: _Words) -> tuple[Node, ...]:
@@ -214,12 +229,26 @@ def _header(path: Path, lines: list[str], motion: int) -> tuple[float, int]:
         line = lines[n].strip() if n < len(lines) else ""
         value = _numbers([line[len(key) :].strip()]) if line.lower().startswith(key.lower()) else None
         if value is None or value[0] <= 0:
-            raise FormatError(f"{path}: line {n + 1}: found {shorten([line])!r}, expected {key} and a number more than zero")
-        header[key] = float(value[0])
+            raise FormatError(f"{path}: line {n + 1}: found {shorten([line])!r}, expected {key} and a number more than zero"
+                              f"{with_point(line[len(key) :])}")
+        header[key] = _step(line[len(key) :].strip(), float(value[0])) if key == "Frame Time:" else float(value[0])
     frames = sum(bool(line.strip()) for line in lines[n + 1 :])
     if frames and frames != header["Frames:"]:
         warn(f"{path}: line {n}, Frames: found {header['Frames:']:g}, but the file has {frames}; those are used")
     return header["Frame Time:"], n + 1
+
+
+def _step(word: str, step: float) -> float:
+    """Seconds per frame stated as `word`: of the only rate in whole frames/s, or NTSC's, that is rounded to it, else as it stands."""
+    digits = len(word.partition(".")[2])
+    if not 0 < digits < 12 or not word.replace(".", "", 1).isdecimal():
+        return step
+    rate = round(1 / step)
+    for factor in (1.0, 1.001):
+        fit = [factor / n for n in (rate - 1, rate, rate + 1) if n > 0 and abs(factor / n - step) <= 0.5001 * 10.0**-digits]
+        if fit:
+            return fit[0] if len(fit) == 1 else step
+    return step
 
 
 def _values(path: Path, lines: list[str], first: int, width: int) -> Array:
@@ -236,7 +265,10 @@ def _values(path: Path, lines: list[str], first: int, width: int) -> Array:
     values = _numbers([word for _, words in rows for word in words])
     if values is None:
         line, words = next(row for row in rows if _numbers(row[1]) is None)
-        raise FormatError(f"{path}: line {line}: found {shorten(word for word in words if _numbers([word]) is None)!r}, expected numbers")
+        wrong = [(at, word) for at, word in enumerate(words, 1) if _numbers([word]) is None]
+        point = with_point(wrong[0][1])
+        what, place = (wrong[0][1], f", number {wrong[0][0]}") if point else (shorten(word for _, word in wrong), "")
+        raise FormatError(f"{path}: line {line}{place}: found {what!r}, expected numbers{point}")
     return values.reshape(len(rows), width)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import struct
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,8 @@ KEY = 0x50
 """The second byte of every file."""
 INTEL, DEC, MIPS = 84, 85, 86
 """Kinds of processors in the parameter section."""
+BITS = 0xFFFF
+"""Greatest number of frames that the header can state."""
 MAX_COORDINATE = 1e6
 """Largest coordinate, metres; larger ones count as unknown."""
 CHAR, BYTE, INT, FLOAT = -1, 1, 2, 4
@@ -140,6 +143,10 @@ def _header(path: Path, size: int, head: bytes, parameters: dict[str, Any], proc
                           "each more than zero (the scale less where they are floats)")
     start, width = (block - 1) * BYTES, (4 * points + analog) * (4 if scale < 0 else 2)
     stated, there = _stated_frames(known, first, last), max(size - start, 0) // width
+    if _is_cut(known, stated, last, there, width):
+        there = max(_without_padding(path, start, width, there), stated)
+        warn(f"{path}: the header's 16 bits state {stated} frames, but the file has {there} by its length; those are used")
+        stated = there
     if there < stated:
         warn(f"{path}: found {there} frames, but it tells of {stated}; those are used")
     if not min(stated, there):
@@ -153,8 +160,27 @@ def _stated_frames(known: C3d, first: int, last: int) -> int:
     start, end = (_fields(known, end) for end in ("START", "END"))
     if end >= start > 0:
         return end - start + 1
-    long = known.numbers("POINT:LONG_FRAMES")
-    return int(long[0]) if len(long) and 0 < long[0] < 2**31 else max(last - first + 1, 0)
+    words, few = (known.numbers(f"POINT:{name}") for name in ("LONG_FRAMES", "FRAMES")), max(last - first + 1, 0)
+    long, short = (int(word[0]) if len(word) and 0 < word[0] < 2**31 else 0 for word in words)
+    return long or (short if short > BITS else few)  # FRAMES as a float may be right where 16 bits are not
+
+
+def _is_cut(known: C3d, stated: int, last: int, there: int, width: int) -> bool:
+    """Whether the last frame by the header, in 16 bits, is before that of the `there` frames of `width` bytes in the file: it is at its
+    limit, or less by 65,536. Parameters that state more count first."""
+    if len(known.numbers("POINT:LONG_FRAMES")) or _fields(known, "END") or stated > BITS:
+        return False
+    return there > stated and (last == BITS or (there - stated > BITS and (there - stated) % (BITS + 1) <= (BYTES - 1) // width))
+
+
+def _without_padding(path: Path, start: int, width: int, there: int) -> int:
+    """The number of frames of `width` bytes from byte `start` on, of `there`, before those of zeros that fill the file's last block."""
+    most = (BYTES - 1) // width
+    with path.open("rb") as file:
+        file.seek(start + (there - most) * width)
+        end = file.read(most * width)
+    empty = (not any(end[n * width : (n + 1) * width]) for n in reversed(range(most)))
+    return there - sum(takewhile(bool, empty))
 
 
 def _fields(known: C3d, end: str) -> int:

@@ -13,6 +13,7 @@ from shadowpuppet.errors import FormatError
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.names import composed
 
 JOINTS = tuple(dict.fromkeys(joint for bone in BONES for joint in bone))
 """Our names."""
@@ -25,13 +26,13 @@ CENTRAL = {
 
 `pelo`, `trxo`, ... are virtual markers of Vicon's gait model, as HumanEva's motion files have them, and `torsodistal`, ... the same in
 its own programs; `hips`, `upleg`, `forearm` are Mixamo's and the CMU database's in BVH; `shldr`, `shin` Poser's, `shldrbend`,
-... its later figures' (DAZ); `necktwist01`, `calf`, `mid1` iClone's, after `CC_Base_`. COCO, HALPE_26 and BODY_25
+... its later figures' (DAZ); `uarm`, `farm` Motive's; `necktwist01`, `calf`, `mid1` iClone's, after `CC_Base_`. COCO, HALPE_26 and BODY_25
 call joints as we do, with `midhip` (OpenPose), `chip` (Pose2Sim) or `hip` (HALPE_26) for the pelvis.
 """
 SIDED = {
     # beside `arm`, `shoulder` is a collar bone's
-    "shoulder": ("sjc", "arm", "upperarm", "uparm", "shldr", "shldrbend", "shoulder", "clo", "upperarmproximal"),
-    "elbow": ("ejc", "elbow", "forearm", "forearmbend", "lowerarm", "lowarm", "huo", "lowerarmproximal"),
+    "shoulder": ("sjc", "arm", "upperarm", "uparm", "uarm", "shldr", "shldrbend", "shoulder", "clo", "upperarmproximal"),
+    "elbow": ("ejc", "elbow", "forearm", "farm", "forearmbend", "lowerarm", "lowarm", "huo", "lowerarmproximal"),
     "wrist": ("wjc", "wrist", "hand", "rao", "lowerarmdistal"),
     "hand": ("handmiddle1", "hand", "fingerbase", "middle1", "mid1", "hno"),
     "hip": ("hjc", "upleg", "upperleg", "thigh", "thighbend", "hip", "fep", "upperlegproximal"),
@@ -80,12 +81,13 @@ def read_names(path: str | Path) -> dict[str, str]:
 def with_names(names: Sequence[str], given: Mapping[str, str]) -> tuple[str, ...]:
     """A file's names, with ours where `given` (by ours) has them; another joint of that name gets a number. Raises `FormatError` if a name
     that is given is not there."""
-    missing = [theirs for theirs in given.values() if theirs not in names]
+    there = set(map(composed, names))
+    missing = [theirs for theirs in given.values() if composed(theirs) not in there]
     if missing:
         raise FormatError(f"names: found {shorten(missing[:1], 60)!r}, which is no joint of the file; there are: {shorten(names, 400)}")
-    ours = {theirs: name for name, theirs in given.items()}
+    ours = {composed(theirs): name for name, theirs in given.items()}
     taken = {name for name in given if given[name] != name}
-    return tuple(ours.get(name, f"{name}#2" if name in taken else name) for name in names)
+    return tuple(ours.get(composed(name), f"{name}#2" if name in taken else name) for name in names)
 
 
 def renamed(table: JointTable) -> JointTable:

@@ -20,6 +20,7 @@ from shadowpuppet.io.motion.npz import read_npz
 from shadowpuppet.io.motion.parquet import read_parquet
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.names import spelled_as
 
 AMC_RATE = 120.0
 """Default frames/s of .amc files, which do not state it: the CMU laboratory's."""
@@ -83,6 +84,7 @@ def read_truth(path: str | Path, known: Sequence[str] = JOINTS) -> JointTable:
     if ending in (".bvh", ".amc"):
         return read_motion(path)
     table = READERS[ending](path)
+    table = replace(table, names=tuple(spelled_as(dict.fromkeys(table.names), known)))
     same = [name for name in table.names if name in known and name not in JOINTS]
     if not columns_of(table.names) and not pairs_of(table.names):
         if same:

@@ -13,6 +13,7 @@ from shadowpuppet.errors import FormatError
 from shadowpuppet.io.motion.c3d import read_header
 from shadowpuppet.io.motion.joint_names import columns_of, pairs_of, renamed
 from shadowpuppet.io.motion.motion_files import leg_length, read_motion
+from shadowpuppet.motion.interpolation import rate_of
 from shadowpuppet.motion.motion import JointTable
 
 FORMATS = {
@@ -67,7 +68,7 @@ def look_at_motion(path: str | Path) -> MotionLook:
     length = leg_length(renamed(table)) if known and not problem else np.nan
     return MotionLook(
         str(path), FORMATS[path.suffix.lower()], len(table.times),
-        1 / float(np.median(np.diff(table.times))) if len(table.times) > 1 else None, float(table.times[0]), float(table.times[-1]),
+        rate_of(table.times) if len(table.times) > 1 else None, float(table.times[0]), float(table.times[-1]),
         known, tuple(name for name in names if name not in used), float((~np.isfinite(table.positions).all(2)).mean()),
         float(length) if np.isfinite(length) else None,
         tuple(read_header(path).channels) if path.suffix.lower() == ".c3d" else (), (*problem, *notes),

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from shadowpuppet.errors import FormatError, choices
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.files.table import Table, cells, csv_line, read_table, shorten
-from shadowpuppet.io.files.text import errors_named, write_whole
+from shadowpuppet.io.files.table import Table, cells, csv_line, read_table, shorten, table_of
+from shadowpuppet.io.files.text import errors_named, read_text, write_whole
+from shadowpuppet.io.motion.motive import is_motive, joints_of_motive
 from shadowpuppet.io.motion.trc import read_trc, write_trc
 from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import STATUSES, JointTable, Motion, MotionFrame
@@ -53,7 +54,7 @@ def column_joints(path: Path, columns: Sequence[str]) -> tuple[str, ...]:
 
 
 def read_joints(path: str | Path) -> JointTable:
-    """Joints from a file: .csv with the header `time,<joint>_x,<joint>_y,<joint>_z,...` (seconds, metres), or .trc.
+    """Joints from a file: .csv with the header `time,<joint>_x,<joint>_y,<joint>_z,...` (seconds, metres) or of Motive, or .trc.
 
     Other columns are ignored; an empty cell is an unknown coordinate. Raises `FormatError` naming file, line and column.
     """
@@ -68,7 +69,9 @@ def write_joints(path: str | Path, table: JointTable) -> None:
 
 
 def _read_csv(path: Path) -> JointTable:
-    table = read_table(path)
+    if is_motive(text := read_text(path)):
+        return joints_of_motive(path, text)
+    table = table_of(path, text)
     names, times = column_joints(path, table.columns), table.times()
     with errors_named(path):
         return JointTable(times, names, _joints(table, names))

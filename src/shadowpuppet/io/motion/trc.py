@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, warn
 from shadowpuppet.io.files.table import cells, check_times, number, shorten
 from shadowpuppet.io.files.text import errors_named, read_text, write_whole
+from shadowpuppet.motion.interpolation import rate_of
 from shadowpuppet.motion.motion import JointTable
 
 METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -22,6 +23,7 @@ KEYS = ("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataR
 def read_trc(path: str | Path) -> JointTable:
     """Read a TRC file: markers in metres, in the file's axes; an empty cell or NaN is unknown.
 
+    The column of times counts: DataRate is often rounded.
     Blanks in the first three lines and doubled tabs are allowed where they leave no doubt: samples of OpenSim have them.
     Raises `FormatError`, naming line and column, if the file is malformed; warns of a wrong number of frames.
     """
@@ -137,5 +139,4 @@ def _check_count(path: Path, header: dict[str, str], count: int) -> None:
 
 
 def _rate(table: JointTable) -> str:
-    step = float(np.median(np.diff(table.times))) if len(table.times) > 1 else 1.0
-    return f"{1 / step:.6g}"
+    return f"{rate_of(table.times) if len(table.times) > 1 else 1.0:.6g}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -155,6 +156,12 @@ def test_usd_holds_the_skeleton_the_motion_and_the_skin(name, tmp_path, rng):
     assert bind[:, 3, :3] == pytest.approx(animation.rest, abs=1e-5)
     assert numbers(array_of(text, "primvars:skel:jointIndices")).tolist() == mesh.joints.tolist()
     assert numbers(array_of(text, "points")).reshape(-1, 3) == pytest.approx(mesh.points, abs=1e-5)
+
+
+def test_usd_has_the_nominal_rate_if_the_times_are_its_own_but_for_rounding(tmp_path, rng):
+    animation, mesh = puppet("rounded", rng)
+    write_usda(tmp_path / "a.usda", replace(animation, times=np.round(np.arange(8) / 30, 5)), mesh)
+    assert re.findall(r"(?:timeCodes|frames)PerSecond = (\S+)", (tmp_path / "a.usda").read_text()) == ["30", "30"]
 
 
 def test_unknown_frames_are_invisible_in_usd_and_names_are_made_valid(tmp_path, rng):

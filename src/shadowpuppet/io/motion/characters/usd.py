@@ -14,8 +14,8 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.glb import quaternions
 from shadowpuppet.motion.animation import Y_UP, Animation
+from shadowpuppet.motion.interpolation import rate_of
 from shadowpuppet.motion.mesh import Mesh
-from shadowpuppet.motion.synchronization import step_of
 
 TEMPLATE = """#usda 1.0
 (
@@ -99,7 +99,7 @@ def write_usda(path: str | Path, animation: Animation, mesh: Mesh, smoothing: st
         raise ShadowPuppetError(f"{path}: found no frame in which the whole skeleton is known, expected one at least")
     if gaps := len(animation.times) - len(known):
         warn(f"{path}: {gaps} of {len(animation.times)} frames are not known: the puppet is invisible in them")
-    rate = round(1 / step_of(animation.times), 3) if len(animation.times) > 1 else 1
+    rate = rate_of(animation.times) if len(animation.times) > 1 else 1
     codes = (animation.times - animation.times[0]) * rate
     R, t = animation.rotations.copy(), animation.shifts.copy()
     R[:, 0], t[:, 0] = Y_UP @ R[:, 0], t[:, 0] @ Y_UP.T
