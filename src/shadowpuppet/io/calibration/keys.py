@@ -37,10 +37,11 @@ def unknown_keys(where: str, table: Mapping[str, object], known: Iterable[str | 
     for key, value in table.items():
         if key in names or any(pattern.fullmatch(key) for pattern in patterns):
             continue
-        if TELLING.search(key) and not _is_neutral(value):
+        if not TELLING.search(key):
+            yield key
+        elif not _is_neutral(value):
             raise CalibrationError(f"{where}{key}: found {shown(value)[:80]}, which is not known here and may change where points are "
                                    "seen; take it out if it does not, or convert the file")
-        yield key
 
 
 def _is_neutral(value: object) -> bool:

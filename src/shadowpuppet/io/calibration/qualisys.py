@@ -7,6 +7,7 @@ Distortion is as OpenCV's. Pose2Sim (0.10) divides it by 64, too, which would le
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,14 @@ from shadowpuppet.io.calibration.draft import Draft, Drafts
 SUBPIXELS = 64
 BACKWARD = np.diag([1.0, -1.0, -1.0])
 """From axes with y up and z backward to OpenCV's."""
+CAMERA_KEYS = ("active", "avg-residual", "calibrated", "id", "model", "name", "points-count", "serial", "video_resolution", "viewrotation")
+"""Attributes of a camera, of which `active`, `model`, `serial` and `viewrotation` are used."""
+PARTS = {"fov_video": ("left", "top", "right", "bottom"),
+         "transform": ("x", "y", "z", *(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))),
+         "intrinsic": ("focallength", "sensorMinU", "sensorMaxU", "sensorMinV", "sensorMaxV", "focalLengthU", "focalLengthV", "centerPointU",
+                       "centerPointV", *(f"radialDistortion{n}" for n in (1, 2, 3)), *(f"tangentalDistortion{n}" for n in (1, 2)))}
+"""Attributes of a camera's parts; `skew` is refused unless it is zero."""
+OTHER_PARTS = ("fov_marker", "fov_marker_max", "fov_video_max")
 
 
 def read_qualisys(path: Path) -> Drafts:
@@ -33,7 +42,16 @@ def read_qualisys(path: Path) -> Drafts:
     turned = [entry.camera for entry in used if entry.element.get("viewrotation", "0") not in ("0", "")]
     if turned:
         notes.append(f"the view of {', '.join(turned)} was turned in QTM: films must have been exported without turning")
-    return Drafts(tuple(map(_draft, used)), "mm", tuple(notes))
+    unused = tuple(key for entry in used for key in _unknown(entry))
+    return Drafts(tuple(map(_draft, used)), "mm", tuple(notes), unused)
+
+
+def _unknown(entry: Entry) -> Iterator[str]:
+    """Attributes of a camera and its parts that are not known."""
+    yield from entry.unknown(CAMERA_KEYS)
+    for tag, keys in PARTS.items():
+        yield from entry.child(tag).unknown(keys)
+    yield from (part.tag for part in entry.element if part.tag not in (*PARTS, *OTHER_PARTS))
 
 
 def _draft(entry: Entry) -> Draft:
