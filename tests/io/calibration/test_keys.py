@@ -98,7 +98,7 @@ def test_keys_that_are_not_known_are_named_once(tmp_path):
     path = rig(tmp_path, shutter="global", gain=3)
     with pytest.warns(ShadowPuppetWarning) as caught:
         read_calibration(path)
-    assert [str(each.message) for each in caught] == [f"{path}: not known here and not used: shutter, gain"]
+    assert [str(each.message) for each in caught] == [f"{path}: stated there but not used: shutter, gain"]
     assert examine_calibration(path).notes == (str(caught[0].message),)
 
 
@@ -118,7 +118,7 @@ def test_every_format_names_what_it_does_not_know(tmp_path, name, before, after,
     path = tmp_path / name
     assert before in path.read_text()
     path.write_text(path.read_text().replace(before, after))
-    with pytest.warns(ShadowPuppetWarning, match=f"not known here and not used: {key}"):
+    with pytest.warns(ShadowPuppetWarning, match=f"stated there but not used: {key}"):
         read_calibration(path)
     path.write_text(path.read_text().replace(key, "flipped_axes").replace("flipped_axes = 1", "flipped_axes = true"))
     said(path, "flipped_axes: found", "may change where points are seen")
@@ -138,7 +138,7 @@ def test_a_stated_unit_is_used(tmp_path, word, unit):
 def test_several_lenses_without_places_are_refused(tmp_path):
     tables = {camera.name: {key: value for key, value in as_json(camera).items() if key not in "Rt"} for camera in MADE}
     path = written(tmp_path, "c.json", json.dumps({**tables, "positions": {"a": 1}}))
-    said(path, f"found lenses without places of {MADE[0].name}, {MADE[1].name}", "not known here: positions")
+    said(path, f"found lenses without places of {MADE[0].name}, {MADE[1].name}", "stated there but not used: positions")
     path.write_text(json.dumps(tables))
     assert len(read_calibration(path, places=False)) == 3
     path.write_text(json.dumps({MADE[0].name: tables[MADE[0].name]}))
@@ -311,6 +311,13 @@ def test_oblique_pixels_are_refused(tmp_path, name, before, after, key):
     calibrations.write_all(tmp_path, MADE)
     (tmp_path / name).write_text((tmp_path / name).read_text().replace(before, after))
     said(tmp_path / name, f"camera '{MADE[0].name}': {key}", "may change where points are seen")
+
+
+def test_a_view_turned_in_qtm_is_named_where_a_run_reads_it(tmp_path):
+    path = written(tmp_path, "Calib.qca.txt", calibrations.qualisys(MADE).replace('viewrotation="0"', 'viewrotation="90"', 1))
+    with pytest.warns(ShadowPuppetWarning, match="not used: viewrotation"):
+        read_calibration(path)
+    assert any("was turned in QTM" in note for note in examine_calibration(path).notes)
 
 
 def test_a_chain_s_delays_are_named(tmp_path):

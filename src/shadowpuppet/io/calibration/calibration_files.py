@@ -53,7 +53,7 @@ class Calibration:
     turns: tuple[int, ...] = ()
     """Quarter turns clockwise by which each camera's pictures stand upright; empty if the file says nothing of it."""
     unused: str = ""
-    """A sentence about keys of the file that are not known here; empty if there are none."""
+    """A sentence about keys of the file that are not used; empty if there are none."""
 
     @property
     def shown(self) -> tuple[Camera, ...]:
@@ -109,7 +109,7 @@ def examine_calibration(path: str | Path, unit: str | None = None, up: str | Non
             raise CalibrationError(f"{path}: {'' if str(error).startswith(where) else where}{error}") from None
         cameras[camera.name] = camera
     made, turns = tuple(cameras.values()), tuple(draft.turns for draft in found.drafts)
-    unused = f"{path}: not known here and not used: {shorten(dict.fromkeys(map(printable, found.unused)))}" if found.unused else ""
+    unused = f"{path}: stated there but not used: {shorten(dict.fromkeys(map(printable, found.unused)))}" if found.unused else ""
     upright = rotated_up(made, up, _turned(made, turns)) if up else made
     return Calibration(path, kind.name, upright, used, bool(unit or found.unit), (*notes, *([unused] if unused else [])), turns, unused)
 
@@ -118,7 +118,7 @@ def _check_places(path: Path, found: Drafts) -> None:
     """Raise `CalibrationError` for several cameras of which one has no place."""
     bare = [draft.name for draft in found.drafts if draft.T is None]
     if bare and len(found.drafts) > 1:
-        unused = f"; not known here: {shorten(dict.fromkeys(map(printable, found.unused)))}" if found.unused else ""
+        unused = f"; stated there but not used: {shorten(dict.fromkeys(map(printable, found.unused)))}" if found.unused else ""
         raise CalibrationError(f"{path}: found lenses without places of {shorten(bare)}, expected R and t (or the like) of every camera, "
                                f"as there are {len(found.drafts)}{unused}")
 

@@ -46,7 +46,7 @@ class Drafts(NamedTuple):
     notes: tuple[str, ...] = ()
     """Remarks for the user, a sentence each."""
     unused: tuple[str, ...] = ()
-    """Keys of the file that are not known here (`keys.unknown_keys`)."""
+    """Keys of the file that are not used and that the user should know of (`keys.unknown_keys`)."""
 
 
 def text_of(path: Path) -> str:
