@@ -208,6 +208,11 @@ def test_programs_with_rules_of_their_own(tmp_path, kind, names):
     assert (found.unit, found.unused) == ("mm" if kind == "jarvis" else "m", "")
 
 
+@pytest.mark.parametrize("kind", ["multical.json", "calibrated_cameras_data.yml", "camchain.yaml"])
+def test_a_world_that_is_a_camera_s_is_said(tmp_path, kind):
+    assert "say what is up with --up" in examine_calibration(calibrations.write_all(tmp_path, MADE)[kind]).notes[0]
+
+
 @pytest.mark.parametrize("kind", ["multical.json", "calibrated_cameras_data.yml", "transforms.json"])
 def test_a_recording_may_have_them(tmp_path, kind):
     path = calibrations.write_all(tmp_path, MADE)[kind]

@@ -59,7 +59,8 @@ def read_json(path: Path) -> Drafts:
     try:
         if is_transforms(values):
             return read_transforms(values)
-        values = with_poses(values) if is_multical(values) else values
+        multical = is_multical(values)
+        values = with_poses(values) if multical else values
         around, drafts, inside = _around(values, 0), [], list[str]()
         tables = list(islice(_tables(values, path.stem, 0), MOST_CAMERAS + 1))
         unit = stated_unit("", [around, *(_flat(table) for _, table in tables)])
@@ -74,6 +75,7 @@ def read_json(path: Path) -> Drafts:
         raise CalibrationError(f"{path}: found no camera in it, expected objects with K (or fx, fy, cx, cy), R or rvec, t, and distortion")
     panoptic = isinstance(values, dict) and PANOPTIC in values
     notes = ("lengths are CMU Panoptic's centimetres, and its -y is up: use --up=-y",) if panoptic else ()
+    notes += ("the world frame is that of multical's first camera: say what is up with --up",) if multical else ()
     unused = (*unknown_keys(f"{path}: ", around, KNOWN), *inside)
     return Drafts(tuple(drafts), unit or ("cm" if panoptic else None), notes, unused)
 
