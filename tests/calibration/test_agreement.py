@@ -120,6 +120,14 @@ def test_a_calibration_from_camera_to_world_is_found(cameras, masks):
     assert found.remedy.startswith("the calibration says where cameras stand (camera to world)")
 
 
+def test_places_stated_as_translations_are_found(cameras, masks):
+    """As in Human3.6M: t is the camera's centre."""
+    stated = [replace(camera, T_camera_world=rigid(camera.T_camera_world[:3, :3], camera.centre)) for camera in cameras]
+    found = agreement(stated, masks, STEP)
+    assert found.remedy.startswith("the calibration's translations are the places of the cameras")
+    assert "by -R T: then all agree within" in found.remedy
+
+
 def test_millimetres_are_found_and_refused(cameras, masks):
     found = agreement([made_rig.scaled(camera, 1000) for camera in cameras], masks, STEP)
     assert max(found.apart) < 0.6  # silhouettes know no scale

@@ -200,18 +200,64 @@ def kalibr(made: Sequence[Camera], model: str = "pinhole", distortion: str = "ra
     return "".join(parts)
 
 
+def relative(made: Sequence[Camera], n: int) -> np.ndarray:
+    """First camera to camera n (4, 4)."""
+    return made[n].T_camera_world @ np.linalg.inv(made[0].T_camera_world)
+
+
+def multical(made: Sequence[Camera]) -> str:
+    """multical's calibration.json: lenses, and poses in a section of their own, relative to the first camera."""
+    first = made[0].name
+    lenses = {camera.name: {"model": "standard", "image_size": list(camera.size), "K": camera.matrix.tolist(),
+                            "dist": [camera.distortion[:5].tolist()]} for camera in made}  # fmt: skip
+    keys = [first, *(f"{camera.name}_to_{first}" for camera in made[1:])]
+    poses = {key: {"R": relative(made, n)[:3, :3].tolist(), "T": relative(made, n)[:3, 3].tolist()} for n, key in enumerate(keys)}
+    return json.dumps({"cameras": lenses, "camera_poses": poses, "image_sets": {"rgb": []}})
+
+
+def mc_calib(made: Sequence[Camera], distortion: int = 0) -> str:
+    """MC-Calib's calibrated_cameras_data.yml: a table a camera, with the pose from the camera to the reference camera."""
+    text = f"%YAML:1.0\n---\nnb_camera: {len(made)}\n"
+    for n, camera in enumerate(made):
+        parts = (_node("camera_matrix", camera.matrix) + _node("distortion_vector", camera.distortion[None, :5])
+                 + f"distortion_type: {distortion}\ncamera_group: 0\nimg_width: {camera.size[0]}\nimg_height: {camera.size[1]}\n"
+                 + _node("camera_pose_matrix", np.linalg.inv(relative(made, n))))  # fmt: skip
+        text += f"camera_{n}:\n" + "".join(f"   {line}\n" for line in parts.splitlines())
+    return text
+
+
+def jarvis(camera: Camera) -> str:
+    """JARVIS' YAML: K and R transposed, millimetres."""
+    T = camera.T_camera_world
+    return ("%YAML:1.0\n---\n" + _node("intrinsicMatrix", camera.matrix.T) + _node("distortionCoefficients", camera.distortion[None, :5])
+            + _node("R", T[:3, :3].T) + _node("T", 1000 * T[None, :3, 3]))  # fmt: skip
+
+
+def transforms(made: Sequence[Camera]) -> str:
+    """nerfstudio's transforms.json: camera to world, y up and z backward, pixel centres at halves."""
+    frames = []
+    for camera in made:
+        K, lens = camera.matrix, camera.distortion.tolist()
+        pose = np.linalg.inv(camera.T_camera_world) @ np.diag([1, -1, -1, 1])
+        frames.append({"file_path": f"images/{camera.name}.png", "transform_matrix": pose.tolist(), "fl_x": K[0, 0], "fl_y": K[1, 1],
+                       "cx": K[0, 2] + 0.5, "cy": K[1, 2] + 0.5, "w": camera.size[0], "h": camera.size[1],
+                       **dict(zip(("k1", "k2", "p1", "p2", "k3"), lens))})  # fmt: skip
+    return json.dumps({"camera_model": "OPENCV", "applied_scale": 0.5, "aabb_scale": 16, "frames": frames})
+
+
 def write_all(folder: Path, made: Sequence[Camera]) -> dict[str, Path]:
     """Write a file of every kind; returns the path of each by its name."""
     texts = {"anipose.toml": toml(made), "freemocap.toml": freemocap(made), "camera_array.toml": caliscope(made),
              "panoptic.json": panoptic(made), "colmap/cameras.txt": colmap(made)[0], "colmap/images.txt": colmap(made)[1],
              "Calib.qca.txt": qualisys(made), "KRT": krt(made), "camchain.yaml": kalibr(made),
+             "multical.json": multical(made), "calibrated_cameras_data.yml": mc_calib(made), "transforms.json": transforms(made),
              "session.xcp": vicon(made), "easy/intri.yml": intri(made), "easy/extri.yml": extri(made)}
     for camera in made:
-        texts |= {f"yaml/{camera.name}.yml": opencv(camera)}
+        texts |= {f"yaml/{camera.name}.yml": opencv(camera), f"jarvis/{camera.name}.yaml": jarvis(camera)}
         texts |= {f"xml/{camera.name}.xml": opencv_xml(camera), f"biocv/{camera.name}.mp4.calib": biocv(camera)}
     for name, text in texts.items():
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text)
     (folder / "cameraIntrinsicsExtrinsics.pickle").write_bytes(pickle.dumps({"intrinsicMat": [1]}))
-    whole = {name: folder / name for name in ("easy", "colmap", "yaml", "xml", "biocv")}
+    whole = {name: folder / name for name in ("easy", "colmap", "yaml", "jarvis", "xml", "biocv")}
     return whole | {name: folder / name for name in texts if "/" not in name}

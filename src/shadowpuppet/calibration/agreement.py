@@ -14,7 +14,7 @@ from shadowpuppet.calibration.silhouettes import Row, outlines_of, silhouettes_o
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import HARMFUL, RUINOUS, Caution
-from shadowpuppet.geometry import Array, evenly_spread, inverse
+from shadowpuppet.geometry import Array, evenly_spread, inverse, rigid
 from shadowpuppet.threads import MadeOnDemand
 
 MAX_DISAGREEMENT = 0.01
@@ -203,12 +203,21 @@ def _changes(scene: _Scene, names: Sequence[str], blamed: int | None, seconds: f
     yield (replace(scene, cameras=turned),
            "the calibration says where cameras stand (camera to world), it seems, instead of how the world lies to them; invert every "
            "rotation and translation in calibration.toml")
+    centred = tuple(replace(camera, T_camera_world=_with_centre(camera.T_camera_world)) for camera in scene.cameras)
+    yield (replace(scene, cameras=centred),
+           "the calibration's translations are the places of the cameras, it seems, as in Human3.6M; replace every translation T in "
+           "calibration.toml by -R T")
     if not np.isfinite(seconds):
         return
     for n in range(C) if blamed is None and C < 4 else [blamed] if blamed is not None else []:
         for steps in range(-MAX_SHIFT, MAX_SHIFT + 1):
             if steps:
                 yield _shifted(scene, n, steps), _late(names, n, seconds * steps)
+
+
+def _with_centre(T: Array) -> Array:
+    """World to camera (4, 4) of a camera that stands at the translation of T."""
+    return rigid(T[:3, :3], -T[:3, :3] @ T[:3, 3])
 
 
 def _mirrored(scene: _Scene, which: Sequence[int]) -> _Scene:

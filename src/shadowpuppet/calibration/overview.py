@@ -174,7 +174,7 @@ def _doubts(found: Calibration, middle: Array | None) -> Iterator[str]:
     cameras = found.cameras
     placed = [camera for camera in cameras if camera.oriented]
     if placed:
-        yield from _up_doubts(placed)
+        yield from _up_doubts([camera for camera in found.shown if camera.oriented])
     gaps = {(a.name, b.name): float(np.linalg.norm(a.centre - b.centre)) for a, b in combinations(placed, 2)}
     if gaps and not found.unit_known and not RIG_EXTENT[0] < max(gaps.values()) < RIG_EXTENT[1]:
         yield (f"the cameras stand up to {max(gaps.values()):.3g} m apart: is that in metres? say what the file's lengths are in: "

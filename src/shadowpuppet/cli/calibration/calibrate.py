@@ -67,7 +67,7 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
 
     with terminal() as listener:
         session = open_session(lab, None if board is None else _board(lab, board, square, dictionary))
-        known = {camera.name: camera for camera in read_calibration(lenses)} if lenses is not None else None
+        known = {camera.name: camera for camera in read_calibration(lenses, places=False)} if lenses is not None else None
         done = 0
 
         def begin(what: str, count: int) -> None:

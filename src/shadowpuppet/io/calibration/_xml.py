@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import cast
 from xml.etree.ElementTree import Element, ParseError, XMLPullParser
@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element, ParseError, XMLPullParser
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.draft import numbers_of, text_of
+from shadowpuppet.io.calibration.keys import unknown_keys
 
 MAX_DEPTH = 40
 """Greatest depth of nested elements; calibrations have seven levels."""
@@ -51,6 +52,11 @@ class Entry:
             raise CalibrationError(f"{self.path}: camera {self.camera!r}: <{tag}>: missing")
         return Entry(self.path, self.camera, found)
 
+    def unknown(self, known: Iterable[str]) -> Iterator[str]:
+        """Attributes of the element that are not known (`unknown_keys`). Raises `CalibrationError` for one that may move points."""
+        values = {key: _value(text) for key, text in self.element.attrib.items()}
+        return unknown_keys(f"{self.path}: camera {self.camera!r}: ", values, known)
+
     def numbers(self, key: str, counts: tuple[int, ...] = (1,), without: str | None = None) -> Array:
         """Numbers of attribute `key`, one of `counts` in number; `without`: text used if it is missing. Raises `CalibrationError`."""
         value = self.element.get(key, without)
@@ -64,6 +70,12 @@ class Entry:
     def number(self, key: str, without: str | None = None) -> float:
         """The number of attribute `key`; `without`: text used if it is missing. Raises `CalibrationError`."""
         return float(self.numbers(key, (1,), without)[0])
+
+
+def _value(text: str) -> str | float:
+    """An attribute's number, or its text."""
+    number = numbers_of(text, (1,))
+    return text if number is None else float(number[0])
 
 
 def entries(path: Path, root: Element, tag: str, name: str) -> Iterator[Entry]:

@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import CalibrationError, ShadowPuppetError, reason
+from shadowpuppet.errors import CalibrationError, ShadowPuppetError, printable, reason, warn
 from shadowpuppet.geometry import Array, inverse, rigid
-from shadowpuppet.io.calibration.draft import Draft
+from shadowpuppet.io.calibration.draft import Draft, Drafts
 from shadowpuppet.io.calibration.formats import ROUGH, format_of
+from shadowpuppet.io.calibration.keys import is_transposed
 from shadowpuppet.io.calibration.opencv import SUFFIXES, easymocap_texts
 from shadowpuppet.io.calibration.pose2sim import check_name, tables_text
+from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import write_whole
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -48,29 +50,42 @@ class Calibration:
     """Whether the file, its format or the user states the unit; else metres are assumed."""
     notes: tuple[str, ...]
     """Remarks for the user, a sentence each."""
+    turns: tuple[int, ...] = ()
+    """Quarter turns clockwise by which each camera's pictures stand upright; empty if the file says nothing of it."""
+    unused: str = ""
+    """A sentence about keys of the file that are not used; empty if there are none."""
+
+    @property
+    def shown(self) -> tuple[Camera, ...]:
+        """The cameras turned about their axes so that their pictures stand upright: for directions only, not to project."""
+        return _turned(self.cameras, self.turns)
 
 
 def read_calibration(path: str | Path, *, unit: str | None = None, up: str | None = None,
-                     sizes: Callable[[str], tuple[int, int] | None] | None = None) -> tuple[Camera, ...]:
+                     sizes: Callable[[str], tuple[int, int] | None] | None = None, places: bool = True) -> tuple[Camera, ...]:
     """Cameras of a calibration file or folder, in its order: metres, X_camera = R X_world + t, OpenCV's lens.
 
     Formats, recognised by content: JSON with K, R and t a camera, COLMAP's text, TOML of Pose2Sim, Anipose, FreeMoCap and Caliscope (its
-    own and its export), OpenCV's YAML and XML, EasyMocap's pair, Kalibr's camera chain, KRT, BioCV's .calib, Qualisys' .qca.txt, Vicon's
-    .xcp. Raises `CalibrationError` with the file, camera and field if
-    something is missing or impossible.
+    own and its export), OpenCV's YAML and XML, EasyMocap's pair, JARVIS, MC-Calib, multical, transforms.json, Kalibr's camera chain, KRT,
+    BioCV's .calib, Qualisys' .qca.txt, Vicon's .xcp. Warns of keys that are not known. Raises `CalibrationError` with the file, camera and
+    field if something is missing or impossible.
 
     Args:
         path: the file or folder.
         unit: unit of lengths (m, cm, mm), for files that do not state it.
         up: direction of the file's world that is up, of `UPS`.
         sizes: width and height of a camera's pictures by its name, for files without sizes.
+        places: whether several cameras without places are refused; False where only lenses are needed.
     """
-    return examine_calibration(path, unit, up, sizes).cameras
+    found = examine_calibration(path, unit, up, sizes, places)
+    if found.unused:
+        warn(found.unused)
+    return found.cameras
 
 
 @np.errstate(all="ignore")  # impossible numbers are refused where they are checked
 def examine_calibration(path: str | Path, unit: str | None = None, up: str | None = None,
-              sizes: Callable[[str], tuple[int, int] | None] | None = None) -> Calibration:
+              sizes: Callable[[str], tuple[int, int] | None] | None = None, places: bool = True) -> Calibration:
     """As `read_calibration`; also returns format, unit and remarks."""
     path = Path(path)
     for what, value, known in (("unit", unit, UNITS), ("up", up, UPS)):
@@ -80,6 +95,8 @@ def examine_calibration(path: str | Path, unit: str | None = None, up: str | Non
     if kind is ROUGH:  # metres and z up always: what a recording states is its calibration's
         unit = up = None
     found = kind.read(path)
+    if places:
+        _check_places(path, found)
     used, notes = unit or found.unit or "m", list(found.notes)
     cameras: dict[str, Camera] = {}
     for draft in found.drafts:
@@ -91,8 +108,28 @@ def examine_calibration(path: str | Path, unit: str | None = None, up: str | Non
             where = draft.where or f"camera {draft.name!r}: "
             raise CalibrationError(f"{path}: {'' if str(error).startswith(where) else where}{error}") from None
         cameras[camera.name] = camera
-    upright = rotated_up(tuple(cameras.values()), up) if up else tuple(cameras.values())
-    return Calibration(path, kind.name, upright, used, bool(unit or found.unit), tuple(notes))
+    made, turns = tuple(cameras.values()), tuple(draft.turns for draft in found.drafts)
+    unused = f"{path}: stated there but not used: {shorten(dict.fromkeys(map(printable, found.unused)))}" if found.unused else ""
+    upright = rotated_up(made, up, _turned(made, turns)) if up else made
+    return Calibration(path, kind.name, upright, used, bool(unit or found.unit), (*notes, *([unused] if unused else [])), turns, unused)
+
+
+def _check_places(path: Path, found: Drafts) -> None:
+    """Raise `CalibrationError` for several cameras of which one has no place."""
+    bare = [draft.name for draft in found.drafts if draft.T is None]
+    if bare and len(found.drafts) > 1:
+        unused = f"; stated there but not used: {shorten(dict.fromkeys(map(printable, found.unused)))}" if found.unused else ""
+        raise CalibrationError(f"{path}: found lenses without places of {shorten(bare)}, expected R and t (or the like) of every camera, "
+                               f"as there are {len(found.drafts)}{unused}")
+
+
+def _turned(cameras: tuple[Camera, ...], turns: tuple[int, ...]) -> tuple[Camera, ...]:
+    """The cameras turned about their axes by quarter turns of their pictures, clockwise."""
+    if not any(turns):
+        return cameras
+    quarter = rigid(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.zeros(3))
+    return tuple(replace(camera, T_camera_world=np.linalg.matrix_power(quarter, n % 4) @ camera.T_camera_world)
+                 for camera, n in zip(cameras, turns, strict=True))
 
 
 def _camera(draft: Draft, metres: float, sizes: Callable[[str], tuple[int, int] | None] | None, notes: list[str]) -> Camera:
@@ -104,6 +141,7 @@ def _camera(draft: Draft, metres: float, sizes: Callable[[str], tuple[int, int] 
         raise CalibrationError(f"translation: found {T[:3, 3].tolist()}, {distance:g} long, expected at most {MAX_DISTANCE:g} "
                                f"metres; it is probably in {name}: say so by unit = \"{unit}\" in recording.toml, or write it in metres, "
                                f"with `shadowpuppet info FILE --unit {unit} --to NEW.toml`")
+    _check_transposed(draft)
     size = draft.size or (sizes(draft.name) if sizes is not None else None) or _guessed(draft, notes)
     matrix = Camera.from_fov((int(size[0]), int(size[1])), draft.fov).matrix if draft.fov is not None else np.asarray(draft.matrix)
     lens = np.ravel(np.asarray(draft.distortion, float))
@@ -112,6 +150,13 @@ def _camera(draft: Draft, metres: float, sizes: Callable[[str], tuple[int, int] 
         lens = np.pad(lens, (0, 4 - lens.size)) if draft.where[:1] != "[" and 0 < lens.size < 4 else lens
     scaled = rigid(T[:3, :3], T[:3, 3] * metres)
     return Camera(draft.name, (size[0], size[1]), matrix, lens, scaled, draft.fisheye, draft.oriented)  # pyright: ignore[reportArgumentType]
+
+
+def _check_transposed(draft: Draft) -> None:
+    matrix = None if draft.matrix is None else np.asarray(draft.matrix, float)
+    if matrix is not None and matrix.shape == (3, 3) and is_transposed(matrix):
+        raise CalibrationError(f"matrix: found a last row of {matrix[2].tolist()}, expected 0 0 1: the matrix is transposed, as MATLAB's "
+                               "are; transpose it, and the rotation, which is probably transposed too")
 
 
 def _guessed(draft: Draft, notes: list[str]) -> tuple[float, float]:
@@ -130,11 +175,12 @@ def _guessed(draft: Draft, notes: list[str]) -> tuple[float, float]:
     return size
 
 
-def rotated_up(cameras: tuple[Camera, ...], up: str) -> tuple[Camera, ...]:
-    """The cameras after a rotation of the world that brings its direction `up` (of `UPS`) to Z."""
+def rotated_up(cameras: tuple[Camera, ...], up: str, shown: tuple[Camera, ...] | None = None) -> tuple[Camera, ...]:
+    """The cameras after a rotation of the world that brings its direction `up` (of `UPS`) to Z; `shown`: the cameras turned so that their
+    pictures stand upright, if they do not."""
     direction = UPS[up]
     if direction is None:
-        direction = _level(cameras)
+        direction = _level(shown or cameras)
     turn = _turn_to_z(np.asarray(direction, float))
     return tuple(replace(camera, T_camera_world=camera.T_camera_world @ inverse(turn)) for camera in cameras)
 

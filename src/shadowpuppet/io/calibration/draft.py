@@ -31,6 +31,8 @@ class Draft:
     oriented: bool = True
     where: str = ""
     """Prefix of messages about it, for example `[cam1]: `."""
+    turns: int = 0
+    """Quarter turns clockwise by which its pictures stand upright."""
     fov: float | None = None
     """Horizontal field of view, radians, of a lens that is known by that alone."""
 
@@ -43,6 +45,8 @@ class Drafts(NamedTuple):
     """Unit of lengths, m, cm or mm, if the format or file states it."""
     notes: tuple[str, ...] = ()
     """Remarks for the user, a sentence each."""
+    unused: tuple[str, ...] = ()
+    """Keys of the file that are not used and that the user should know of (`keys.unknown_keys`)."""
 
 
 def text_of(path: Path) -> str:

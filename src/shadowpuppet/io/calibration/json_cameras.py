@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,9 @@ import numpy as np
 from shadowpuppet.errors import CalibrationError, shown
 from shadowpuppet.geometry import Array, inverse, rigid, rotation_from_vector
 from shadowpuppet.io.calibration.draft import Draft, Drafts, text_of
+from shadowpuppet.io.calibration.keys import LENS_KEYS, UNIT_KEYS, is_fisheye, stated_unit, unknown_keys
+from shadowpuppet.io.calibration.programs.multical import is_multical, with_poses
+from shadowpuppet.io.calibration.programs.transforms import is_transforms, read_transforms
 
 NAMES = {
     "matrix": "k|camera_?matrix|intrinsic_?matrix|intrinsics?|matrix|mtx|k_?matrix",
@@ -27,10 +31,16 @@ NAMES = {
     "inverse": "cam(era)?_?to_?world|c2w|t_world_camera",
     "size": "resolution|image_?size|img_?size|size|imsize", "width": "w|width|image_?width", "height": "h|height|image_?height",
     "name": "name|id|camera|camera_?name|cam_?id|serial|label",
-    "fx": "fx|fl_x", "fy": "fy|fl_y", "cx": "cx", "cy": "cy", "fisheye": "fisheye|is_?fisheye",
+    "fx": "fx|fl_x", "fy": "fy|fl_y", "cx": "cx", "cy": "cy",
 }
 """Programs' names for a camera's parameters."""
 PATTERNS = {kind: re.compile(names, re.IGNORECASE) for kind, names in NAMES.items()}
+PARTS = re.compile("intrinsics?|extrinsics?|calibration|lens|pose|params?|parameters", re.IGNORECASE)
+"""Tables within a camera's."""
+IGNORED = re.compile("calibDataSource|cameras?|rig|version|date|time|timestamp|created|comment|description|notes?|type|panel|node|rms|"
+                     "error|(mean_?|avg_?)?(reprojection_?)?error|(re)?projection_?errors?|rmse|model|lens|camera_?type", re.IGNORECASE)
+"""Keys that do not say where a camera sees a point; a lens' model is found by `is_fisheye`."""
+KNOWN = (*PATTERNS.values(), PARTS, IGNORED, LENS_KEYS, UNIT_KEYS)
 DEPTH = 12
 """Greatest depth at which cameras are looked for."""
 MOST_CAMERAS = 1000
@@ -46,22 +56,35 @@ def read_json(path: Path) -> Drafts:
         raise CalibrationError(f"{path}: found JSON nested too deeply for a calibration") from None
     except ValueError as error:
         raise CalibrationError(f"{path}: found no JSON ({error}), expected a calibration") from None
-    drafts = []
-    for name, table in _tables(values, path.stem, 0):
+    try:
+        if is_transforms(values):
+            return read_transforms(values)
+        multical = is_multical(values)
+        values = with_poses(values) if multical else values
+        around, drafts, inside = _around(values, 0), [], list[str]()
+        tables = list(islice(_tables(values, path.stem, 0), MOST_CAMERAS + 1))
+        unit = stated_unit("", [around, *(_flat(table) for _, table in tables)])
+    except CalibrationError as error:
+        raise CalibrationError(f"{path}: {error}") from None
+    for name, table in tables:
         if len(drafts) == MOST_CAMERAS:
             raise CalibrationError(f"{path}: found over {MOST_CAMERAS} cameras")
+        inside += unknown_keys(f"{path}: camera {shown(name)}: ", _flat(table) | _left_out(table), KNOWN)
         drafts.append(_draft(path, name, table))
     if not drafts:
         raise CalibrationError(f"{path}: found no camera in it, expected objects with K (or fx, fy, cx, cy), R or rvec, t, and distortion")
     panoptic = isinstance(values, dict) and PANOPTIC in values
     notes = ("lengths are CMU Panoptic's centimetres, and its -y is up: use --up=-y",) if panoptic else ()
-    return Drafts(tuple(drafts), "cm" if panoptic else None, notes)
+    notes += ("the world frame is that of multical's first camera: say what is up with --up",) if multical else ()
+    unused = (*unknown_keys(f"{path}: ", around, KNOWN), *inside)
+    return Drafts(tuple(drafts), unit or ("cm" if panoptic else None), notes, unused)
 
 
 def mentions_cameras(path: Path) -> bool:
     """Whether a JSON file holds a camera's intrinsics, so that it is meant as a calibration."""
     try:
-        return next(_tables(json.loads(text_of(path)), "", 0), None) is not None
+        values = json.loads(text_of(path))
+        return is_transforms(values) or next(_tables(values, "", 0), None) is not None
     except (CalibrationError, ValueError, RecursionError):
         return False
 
@@ -92,8 +115,27 @@ def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
     """The table with the entries of its tables `intrinsics` and `extrinsics`, and the like."""
     out = {key: value for key, value in table.items() if not isinstance(value, dict)}
     for key, value in table.items():
-        if isinstance(value, dict) and re.fullmatch("intrinsics?|extrinsics?|calibration|lens|pose|params?|parameters", key, re.IGNORECASE):
+        if isinstance(value, dict) and PARTS.fullmatch(key):
             out |= {inner: held for inner, held in value.items() if inner not in out and not isinstance(held, dict)}
+    return out
+
+
+def _left_out(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables within a camera's that `_flat` leaves out."""
+    parts = [table, *(value for key, value in table.items() if isinstance(value, dict) and PARTS.fullmatch(key))]
+    return {key: value for part in parts for key, value in part.items() if isinstance(value, dict) and not PARTS.fullmatch(key)}
+
+
+def _around(value: Any, depth: int) -> dict[str, Any]:
+    """The entries around the cameras in which no camera is."""
+    if depth > DEPTH or (isinstance(value, dict) and _is_camera(value)):
+        return {}
+    out: dict[str, Any] = {}
+    for key, inner in value.items() if isinstance(value, dict) else (("", inner) for inner in value) if isinstance(value, list) else ():
+        if next(_tables(inner, key, depth + 1), None) is not None:
+            out |= _around(inner, depth + 1)
+        elif key:
+            out[key] = inner
     return out
 
 
@@ -133,7 +175,7 @@ def _draft(path: Path, key: str, table: Mapping[str, Any]) -> Draft:
     return Draft(name=name, matrix=matrix.reshape(3, 3), distortion=distortion if distortion is not None else np.zeros(4),
                  T=_pose(where, numbers("placed", 12, 16), numbers("inverse", 12, 16), numbers("rotation", 3, 9),
                          numbers("translation", 3)),
-                 size=None if size is None else size[:2].tolist(), fisheye=_find(flat, "fisheye") is True,
+                 size=None if size is None else size[:2].tolist(), fisheye=is_fisheye(f"{where}: ", flat),
                  oriented=any(_find(flat, kind) is not None for kind in ("placed", "inverse", "rotation")))  # fmt: skip
 
 

@@ -19,7 +19,11 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
 from shadowpuppet.io.calibration.draft import Draft, Drafts
+from shadowpuppet.io.calibration.keys import LENS_KEYS, UNIT_KEYS, is_fisheye, stated_unit, unknown_keys
 from shadowpuppet.io.calibration.opencv_storage import read_storage
+from shadowpuppet.io.calibration.programs.jarvis import UNIT as JARVIS_UNIT
+from shadowpuppet.io.calibration.programs.jarvis import is_jarvis, untransposed
+from shadowpuppet.io.calibration.programs.mc_calib import is_mc_calib, read_mc_calib
 
 STEMS = {
     "matrix": "camera_?matrix|intrinsic_?matrix|intrinsics?|matrix|mtx|k|m",
@@ -30,6 +34,11 @@ STEMS = {
 }
 """Programs' names for a camera's parameters."""
 PATTERNS = {kind: re.compile(rf"({stem})(?:[_-]?(\d+)|[_-](.+))?", re.IGNORECASE) for kind, stem in STEMS.items()}
+IGNORED = re.compile("names|camera_name|calibration_(time|date)|n_?frames|nr_of_frames|board_(width|height)|square_size|marker_size|flags|"
+                     "(fix_)?aspect_?ratio|pattern|(avg|mean|per_view|total)_reprojection_errors?|reprojection_error|rms|"
+                     "extrinsic_parameters|image_points|grid_points|E|F|Q|P[12]?|R[12]|rectification_matrix|projection_matrix|"
+                     "valid_?roi.*|n_cameras", re.IGNORECASE)
+"""Keys of OpenCV's, ROS' and EasyMocap's files that do not say where a camera of unrectified pictures sees a point."""
 PAIR = (("intri", "extri"), ("intrinsics", "extrinsics"), ("intrinsic", "extrinsic"))
 """Names of pairs of files."""
 SUFFIXES = (".yml", ".yaml", ".xml")
@@ -44,8 +53,7 @@ def read_opencv(path: Path) -> Drafts:
     values: dict[str, Any] = {}
     for file in pair or [path]:
         values |= read_storage(file)
-    drafts, notes = _drafts(path, values, path.stem if pair is None else "cam")
-    return Drafts(tuple(drafts), None, tuple(notes))
+    return _drafts(path, values, path.stem if pair is None else "cam")
 
 
 def pair_of(path: Path) -> tuple[Path, Path] | None:
@@ -63,19 +71,28 @@ def files_of(folder: Path) -> list[Path]:
 
 
 def _one_a_file(folder: Path) -> Drafts:
-    drafts, notes = [], []
-    for file in files_of(folder):
-        made, said = _drafts(file, read_storage(file), file.stem)
-        if len(made) != 1:
-            raise CalibrationError(f"{file}: found {len(made)} cameras, expected one, as there are several files in {folder}")
-        drafts += made
-        notes += said
-    return Drafts(tuple(drafts), None, tuple(notes))
+    files = files_of(folder)
+    found = [_drafts(file, read_storage(file), file.stem) for file in files]
+    for file, each in zip(files, found):
+        if len(each.drafts) != 1:
+            raise CalibrationError(f"{file}: found {len(each.drafts)} cameras, expected one, as there are several files in {folder}")
+    units = {each.unit for each in found}
+    if len(units) > 1:
+        raise CalibrationError(f"{folder}: found lengths in {choices(unit or 'an unknown unit' for unit in units)}, expected one unit")
+    return Drafts(tuple(each.drafts[0] for each in found), units.pop() if units else None,
+                  tuple(note for each in found for note in each.notes), tuple(key for each in found for key in each.unused))
 
 
-def _drafts(path: Path, values: dict[str, Any], alone: str) -> tuple[list[Draft], list[str]]:
-    """Cameras, and remarks, from entries whose keys end in the camera's name; `alone`: name of a camera without such endings."""
-    cameras = _grouped(values)
+def _drafts(path: Path, values: dict[str, Any], alone: str) -> Drafts:
+    """Cameras from entries whose keys end in the camera's name; `alone`: name of a camera without such endings."""
+    try:
+        if is_mc_calib(values):
+            return read_mc_calib(values)
+        jarvis, fisheye, unit = is_jarvis(values), is_fisheye("", values), stated_unit("", [values])
+        unused = tuple(unknown_keys("", values, (*PATTERNS.values(), IGNORED, LENS_KEYS, UNIT_KEYS)))
+    except CalibrationError as error:
+        raise CalibrationError(f"{path}: {error}") from None
+    cameras = _grouped(untransposed(values) if jarvis else values)
     lenses = {end: parts for end, parts in cameras.items() if "matrix" in parts}
     if not lenses:
         raise CalibrationError(f"{path}: no camera matrix in it, expected camera_matrix, or K_<camera> for each; found "
@@ -92,9 +109,9 @@ def _drafts(path: Path, values: dict[str, Any], alone: str) -> tuple[list[Draft]
         raise CalibrationError(f"{path}: no rotation of {choices(bare)}, expected R and T (or rvec and tvec) of every camera; EasyMocap "
                                "has them in extri.yml beside intri.yml")
     notes = [f"{path.name} tells of the lens alone: the camera is taken for level, at the world's origin"] if bare else []
-    fisheye = str(values.get("distortion_model", values.get("camera_model", ""))).lower() in ("fisheye", "equidistant")
     named = values.get("camera_name") if len(lenses) == 1 and isinstance(values.get("camera_name"), str) else None
-    return [_draft(path, named or end or alone, parts, fisheye) for end, parts in lenses.items()], notes
+    drafts = tuple(_draft(path, named or end or alone, parts, fisheye) for end, parts in lenses.items())
+    return Drafts(drafts, unit or (JARVIS_UNIT if jarvis else None), tuple(notes), unused)
 
 
 def _grouped(values: dict[str, Any]) -> dict[str, dict[str, Any]]:

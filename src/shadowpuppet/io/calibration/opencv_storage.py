@@ -20,6 +20,8 @@ from shadowpuppet.io.calibration.draft import numbers_of, text_of
 MATRIX = ("rows", "cols", "data")
 """Keys of a matrix."""
 KEY = re.compile(r"^(\s*)([\w.-]+)\s*:(?:\s+(.*))?$")
+DEPTH = 2
+"""Levels of tables with matrices in them; MC-Calib has one."""
 MAX_ELEMENTS = 4096
 """Larger matrices are skipped: matrices of calibrations have 3 x 3 numbers, maps of rectification millions."""
 
@@ -44,9 +46,14 @@ def _plain(path: Path, element: Element) -> Any:
 
 
 def _of_yaml(path: Path, text: str) -> dict[str, Any]:
-    """Parse the subset of YAML in files of OpenCV and ROS: keys, matrices as tables, lists in brackets or with dashes."""
+    """Parse the subset of YAML in files of OpenCV and ROS: keys, matrices as tables, lists in brackets or with dashes, tables of these."""
+    return _entries(path, [line for line in _logical(path, text)
+                           if line.strip() and not line.lstrip().startswith(("#", "%", "---", "..."))], DEPTH)
+
+
+def _entries(path: Path, lines: list[str], depth: int) -> dict[str, Any]:
+    """The entries of lines that begin without blanks; `depth`: levels of tables in tables."""
     found: dict[str, Any] = {}
-    lines = [line for line in _logical(path, text) if line.strip() and not line.lstrip().startswith(("#", "%", "---", "..."))]
     n = 0
     while n < len(lines):
         match = KEY.match(lines[n])
@@ -54,12 +61,16 @@ def _of_yaml(path: Path, text: str) -> dict[str, Any]:
             raise CalibrationError(f"{path}: found {lines[n].strip()[:60]!r}, expected a key and a colon, as in OpenCV's YAML")
         key, value, below = match[2], (match[3] or "").strip(), []
         while n + 1 < len(lines) and (lines[n + 1][0] in " \t" or lines[n + 1].startswith("-")):
-            below.append(lines[n + 1].strip())
+            below.append(lines[n + 1])
             n += 1
         n += 1
         if key in found:
             raise CalibrationError(f"{path}: found {key} twice")
-        found[key] = _below(path, key, value, below)
+        if depth and not value and any("!!opencv-matrix" in line for line in below):
+            inner = len(below[0]) - len(below[0].lstrip())
+            found[key] = _entries(path, [line[min(inner, len(line) - len(line.lstrip())) :] for line in below], depth - 1)
+        else:
+            found[key] = _below(path, key, value, [line.strip() for line in below])
     return found
 
 

@@ -19,13 +19,18 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
 from shadowpuppet.io.calibration.draft import Draft, Drafts
+from shadowpuppet.io.calibration.keys import LENS_KEYS, UNIT_KEYS, is_fisheye, stated_unit, unknown_keys
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import read_toml
 
 FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
 """Required in a camera's section. Defaults: `name` is the section's, `fisheye` false."""
-KNOWN = (*FIELDS, "name", "fisheye", "oriented", "ignore", "port", "cam_id")
-"""Keys that are read; those of other programs are passed over."""
+KNOWN = (*FIELDS, "name", "fisheye", "oriented", "ignore", "port", "cam_id", "rotation_count")
+"""Keys that are read."""
+IGNORED = ("backend", "error", "exposure", "grid_count", "verified_resolutions", "verbosity", "world_orientation", "world_position")
+"""Keys of other programs that say nothing of where a camera sees a point, or what its rotation and translation say already."""
+ASIDE = ("board", "capture", "charuco", "date", "metadata", "version")
+"""Sections of other programs that are no cameras."""
 BARE_KEY = r"[A-Za-z0-9_-]+"
 """Section titles without quotes."""
 SQUARES = {"mm": (5.0, 500.0), "m": (0.005, 0.5)}
@@ -36,14 +41,23 @@ without a unit."""
 def read_tables(path: Path) -> Drafts:
     """Cameras of a TOML file. Raises `CalibrationError` with the section and field if something is missing or impossible."""
     data = read_toml(path, CalibrationError)
+    unit = stated_unit(f"{path}: ", [data, *([data["metadata"]] if isinstance(data.get("metadata"), dict) else [])])
     nested = data.get("cameras")
     if isinstance(nested, dict) and nested and all(isinstance(table, dict) for table in nested.values()):
-        return _caliscope(path, nested)
+        found = _caliscope(path, nested)
+        return found._replace(unit=unit, unused=(*unknown_keys(f"{path}: ", data, ("cameras", *ASIDE, UNIT_KEYS)), *found.unused))
     sections = {title: table for title, table in data.items() if isinstance(table, dict) and any(key in table for key in FIELDS)}
     if not sections:
         raise CalibrationError(f"{path}: no camera in it, expected a section for each, such as [cam1], with {', '.join(FIELDS)}")
-    unit, notes = _freemocap(data)
-    return Drafts(tuple(_draft(path, title, table, table.get("name", title)) for title, table in sections.items()), unit, notes)
+    board_unit, notes = _freemocap(data)
+    unused = [*unknown_keys(f"{path}: ", data, (*sections, *ASIDE, UNIT_KEYS, re.compile(r"board\..*"))), *_unused(path, sections)]
+    drafts = tuple(_draft(path, title, table, table.get("name", title)) for title, table in sections.items())
+    return Drafts(drafts, unit or board_unit, notes, tuple(unused))
+
+
+def _unused(path: Path, sections: dict[str, dict[str, Any]]) -> list[str]:
+    """Keys of the cameras' sections that are not known."""
+    return [key for title, table in sections.items() for key in unknown_keys(f"{path}: [{title}]: ", table, (*KNOWN, *IGNORED, LENS_KEYS))]
 
 
 def _caliscope(path: Path, cameras: dict[str, dict[str, Any]]) -> Drafts:
@@ -60,7 +74,11 @@ def _caliscope(path: Path, cameras: dict[str, dict[str, Any]]) -> Drafts:
     notes = [f"{why}, left out: {choices(map(str, numbers))}" for why, numbers in (("set aside in Caliscope", aside), ("not placed", bare))
              if numbers]
     drafts = [_draft(path, f"cameras.{number}", table, name(number, table)) for number, table in used.items()]
-    return Drafts(tuple(drafts), None, tuple(notes))
+    if turned := [draft.name for draft in drafts if draft.turns]:
+        notes.append(f"shown turned in Caliscope (rotation_count), so that the films are not upright: {choices(turned)}; up = \"cameras\" "
+                     "reckons with it")
+    unused = _unused(path, {f"cameras.{number}": table for number, table in used.items()})
+    return Drafts(tuple(drafts), None, tuple(notes), tuple(unused))
 
 
 def _freemocap(data: dict[str, Any]) -> tuple[str | None, tuple[str, ...]]:
@@ -99,10 +117,18 @@ def _draft(path: Path, title: str, table: dict[str, Any], name: object) -> Draft
             raise CalibrationError(f"{', '.join(missing)}: missing, expected {', '.join(FIELDS)}{found}")
         size, matrix = numbers_in(table, "size", [(2,)]), numbers_in(table, "matrix", [(3, 3)])
         T = rigid(_rotation(table), _flat(table, "translation", [(3,)]))
-        return Draft(str(name), matrix, _flat(table, "distortions"), T, size.tolist(), table.get("fisheye", False),
-                     table.get("oriented", True), f"[{title}]: ")
+        return Draft(str(name), matrix, _flat(table, "distortions"), T, size.tolist(), is_fisheye("", table),
+                     table.get("oriented", True), f"[{title}]: ", _turns(table))
     except CalibrationError as error:
         raise CalibrationError(f"{path}: [{title}]: {error}") from None
+
+
+def _turns(table: dict[str, Any]) -> int:
+    """Caliscope's `rotation_count`: quarter turns clockwise by which it shows the pictures."""
+    turns = table.get("rotation_count", 0)
+    if isinstance(turns, bool) or not isinstance(turns, int) or abs(turns) > 3:
+        raise CalibrationError(f"rotation_count: found {_short(turns)}, expected a whole number of quarter turns, from -3 to 3")
+    return turns
 
 
 def check_name(name: object) -> None:

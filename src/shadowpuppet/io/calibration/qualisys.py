@@ -8,6 +8,7 @@ Distortion is as OpenCV's. Pose2Sim (0.10) divides it by 64, too, which would le
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,15 @@ FOR_FILMS = re.compile("video|hybrid", re.IGNORECASE)
 """Models of cameras that make films; others do, too, if QTM is set so."""
 BACKWARD = np.diag([1.0, -1.0, -1.0])
 """From axes with y up and z backward to OpenCV's."""
+CAMERA_KEYS = ("active", "avg-residual", "calibrated", "id", "model", "name", "points-count", "serial", "video_resolution", "viewrotation")
+"""Attributes of a camera, of which `active`, `model` and `serial` are used; `viewrotation` is named where it is not zero."""
+PARTS = {"fov_video": ("left", "top", "right", "bottom"),
+         "transform": ("x", "y", "z", *(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))),
+         "intrinsic": ("focallength", "sensorMinU", "sensorMaxU", "sensorMinV", "sensorMaxV", "focalLengthU", "focalLengthV",
+                       "centerPointU", "centerPointV", *(f"radialDistortion{n}" for n in (1, 2, 3)),
+                       *(f"tangentalDistortion{n}" for n in (1, 2)))}
+"""Attributes of a camera's parts; `skew` is refused unless it is zero."""
+OTHER_PARTS = ("fov_marker", "fov_marker_max", "fov_video_max")
 
 
 def read_qualisys(path: Path) -> Drafts:
@@ -37,10 +47,24 @@ def read_qualisys(path: Path) -> Drafts:
         raise CalibrationError(f"{path}: no active camera in it, expected <cameras> with a <camera> each")
     left_out = [entry.camera for entry in cameras if entry not in used]
     notes = [f"cameras for markers are left out: {', '.join(left_out)}"] if left_out else []
-    turned = [entry.camera for entry in used if entry.element.get("viewrotation", "0") not in ("0", "")]
+    turned = [entry.camera for entry in used if _is_turned(entry)]
     if turned:
         notes.append(f"the view of {', '.join(turned)} was turned in QTM: films must have been exported without turning")
-    return Drafts(tuple(map(_draft, used)), "mm", tuple(notes))
+    unused = tuple(key for entry in used for key in _unused(entry))
+    return Drafts(tuple(map(_draft, used)), "mm", tuple(notes), unused)
+
+
+def _unused(entry: Entry) -> Iterator[str]:
+    """Attributes of a camera and its parts that are not used."""
+    yield from entry.unknown(CAMERA_KEYS)
+    yield from ["viewrotation"] if _is_turned(entry) else []
+    for tag, keys in PARTS.items():
+        yield from entry.child(tag).unknown(keys)
+    yield from (part.tag for part in entry.element if part.tag not in (*PARTS, *OTHER_PARTS))
+
+
+def _is_turned(entry: Entry) -> bool:
+    return entry.element.get("viewrotation", "0") not in ("0", "")
 
 
 def _filmed(path: Path) -> set[str]:

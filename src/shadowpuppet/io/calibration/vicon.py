@@ -23,6 +23,11 @@ MAX_DISPLACEMENT = 5.0
 """Greatest relative displacement k1 r^2 at the picture's corner with r in pixels; if it is greater, r is taken to be in focal lengths."""
 MAX_MISFIT = 0.5
 """Greatest misfit of the fitted distortion, pixels, without a remark."""
+CAMERA_KEYS = ("ACTIVE_THRESHOLD", "DEVICEID", "DISPLAY_TYPE", "ISDV", "NAME", "PIXEL_ASPECT_RATIO", "SENSOR", "SENSOR_SIZE", "SYSTEM",
+               "TYPE", "USERID")
+"""Attributes of a camera; `SKEW` is refused unless it is zero."""
+FRAME_KEYS = ("FOCAL_LENGTH", "FRAME", "IMAGE_ERROR", "ORIENTATION", "POSITION", "PRINCIPAL_POINT", "VICON_RADIAL", "VICON_RADIAL2",
+              "WORLD_ERROR")
 
 
 class ViconDistortion(NamedTuple):
@@ -46,7 +51,8 @@ def read_vicon(path: Path) -> Drafts:
         notes.append(f"cameras for markers are left out: {', '.join(entry.camera for entry in cameras if entry not in used)}")
     if len(posed) < len(used):
         notes.append(f"not calibrated, left out: {', '.join(entry.camera for entry in used if entry not in posed)}")
-    return Drafts(tuple(_draft(entry, notes) for entry in posed), "mm", tuple(notes))
+    unused = [key for entry in posed for key in (*entry.unknown(CAMERA_KEYS), *entry.child("KeyFrames/KeyFrame").unknown(FRAME_KEYS))]
+    return Drafts(tuple(_draft(entry, notes) for entry in posed), "mm", tuple(notes), tuple(unused))
 
 
 def _draft(entry: Entry, notes: list[str]) -> Draft:
