@@ -132,6 +132,9 @@ def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
         return "; ".join(f"camera {name!r}: {why}" for name, why in bad[:2])
     sets = (first.masks[n] for n in range(len(first.masks)))  # one after another: the first will do, and the others need not be made
     if not any(sum(mask is not None and may_be_person(mask) for mask in masks) > 1 for masks in sets):
+        if all(camera.quality.ready for camera in look.cameras):
+            return (f"the masks of no two cameras show a person at the same time within the first {OPENING:g} s: is mask n of each camera "
+                    "frame n of its film, and do the masks hold the person?")
         return (f"no two cameras see a person at the same time within the first {OPENING:g} s: do the films belong together, and begin "
                 "together? say in [start] of recording.toml when each began")
     return look.agreement.refusal()
