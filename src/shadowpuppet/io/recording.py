@@ -289,7 +289,8 @@ def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration
         raise UncalibratedError(f"{folder}: no calibration: give the camera's horizontal field of view (--fov DEGREES, option fov; a "
                                 "phone held across has about 65, held upright 40, a webcam 60) or a calibration.toml", films)
     name, film = next(iter(films.items()))
-    return (Camera.from_fov(open_frames(film).size, fov, name),)
+    source = open_frames(film)
+    return (Camera.from_fov(source.size, fov, name, source.pixel),)
 
 
 def _check_names(place: Path, sources: Iterable[str], cameras: Iterable[Camera], asked: Sequence[str] | None, kind: str = "") -> None:

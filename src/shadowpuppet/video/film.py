@@ -49,15 +49,23 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
         stated_rate = (stream.average_rate if timed else stream.guessed_rate) or stream.guessed_rate
         duration, mean_rate = _declared_duration(container, stream), float(stated_rate or math.nan)
         false = abs(stream.frames - duration * mean_rate) > 1 + 0.01 * stream.frames  # an .mp4 whose writer was interrupted
-        count = None if false else stream.frames or None
+        count, pixel = None if false else stream.frames or None, _pixel(stream, first)
 
     step = 1 / (mean_rate if math.isfinite(mean_rate) else rate or ASSUMED_RATE)
 
     def read(wanted: Wanted) -> Iterator[Frame]:
         return _frames(path, film, step, grey, rate, wanted)
 
-    film = FrameSource(str(path), size, rate or mean_rate, count, duration, read)
+    film = FrameSource(str(path), size, rate or mean_rate, count, duration, read, pixel, first.interlaced_frame)
     return film
+
+
+def _pixel(stream: VideoStream, first: VideoFrame) -> float:
+    """Width over height of a pixel in the upright picture, as the stream or else the container says; 1 if neither does."""
+    stated = stream.sample_aspect_ratio
+    if not stated or stated <= 0:
+        return 1.0
+    return float(1 / stated if round(first.rotation / 90) % 2 else stated)
 
 
 def tells_times(path: Path) -> bool:
