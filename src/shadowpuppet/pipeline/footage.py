@@ -122,13 +122,14 @@ class Footage:
         assert self.view.background is not None
         return self.pictures(self.view.background, "the empty scene", len(self.recording.views) > 1)
 
-    def pictures(self, source: Path, what: str, sampled: bool = False) -> Iterator[Image]:
-        """Images of the same camera from another file, at the working size; `what` names them in messages. `sampled`: only those that a
-        sample of several cameras would have.
+    def pictures(self, source: Path, what: str, sampled: bool = False, masks: bool = False) -> Iterator[Image]:
+        """Images of the same camera, or `masks` of it, from another file, at the working size; `what` names them in messages. `sampled`:
+        only those that a sample of several cameras would have.
 
         Raises `RecordingError` if their size is not the film's, with or without the padding of H.264.
         """
         frames, (width, height) = open_frames(source), self.view.camera.size
+        frames = open_masks(source, mask_kind(source, self.label)) if masks else frames
         if frames.size != (width, height) and not differ_by_padding(frames.size, (width, height)):
             raise RecordingError(f"{source}: found {what} of {frames.size[0]} x {frames.size[1]} pixels, expected {width} x {height} "
                                  "as the film: it must come from the same camera at the same setting")
