@@ -14,7 +14,8 @@ from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.recording import POSTURES, Subject, is_recording, read_recording
 from shadowpuppet.pipeline.footage import open_recording
 from shadowpuppet.pipeline.options import make_options
-from shadowpuppet.video import write_frames, write_image
+from shadowpuppet.video import open_frames, write_frames, write_image
+from shadowpuppet.video.film import is_steady
 
 SIZE = (32, 24)
 
@@ -375,3 +376,43 @@ def test_a_film_that_the_calibration_does_not_know_may_be_left_out(tmp_path):
     with pytest.raises(RecordingError, match="found c, but the calibration knows no such camera"):
         read_recording(lab, asked=["a", "c"])
     assert [view.camera.name for view in open_recording(lab, make_options({"camera": "b"})).views] == ["a", "b"]
+
+
+def stamped(path, times):
+    with write_frames(path, 30) as writer:
+        for n, time in enumerate(times):
+            writer.write(np.full((24, 32), n, np.uint8), float(time))
+    return path
+
+
+def in_rates(folder, *rates, number=60):
+    for name, rate in zip(("left", "right"), rates):
+        (folder / "video" / f"{name}.mp4").unlink(missing_ok=True)
+        with write_frames(folder / "video" / f"{name}.mp4", rate) as writer:
+            for _ in range(number):
+                writer.write(picture())
+    return folder
+
+
+def test_films_of_equal_numbers_and_nearly_equal_rates_are_in_step_by_number(two):
+    in_rates(two, 33.0, 34.9)
+    with pytest.warns(ShadowPuppetWarning, match=r"walk: the films have 60 frames each at 33 to 34.9 frames/s: they are taken to be in "
+                                                 r"step by number, at 33 frames/s; if they are not, say in \[start\]"):
+        found = read_recording(two)
+    assert found.rate == pytest.approx(33.0)
+    (two / "recording.toml").write_text("[start]\nleft = 0.0\n")
+    assert read_recording(two).rate is None  # [start] says that times count
+
+
+@pytest.mark.parametrize(("rates", "number"), [((30.0, 30.0), 60), ((30.0, 60.0), 60), ((30.0, 30.2), 60)])
+def test_films_of_one_rate_or_of_others_keep_their_times(two, rates, number):
+    assert read_recording(in_rates(two, *rates, number=number)).rate is None
+
+
+def test_films_that_miss_frames_keep_their_times(two, tmp_path):
+    whole, gap = np.arange(60) / 30, np.delete(np.arange(61) / 30, 20)
+    for name, times in (("left", whole), ("right", gap)):
+        stamped(two / "video" / f"{name}.mp4", times)
+        assert is_steady(two / "video" / f"{name}.mp4") == (name == "left")
+    assert open_frames(two / "video" / "right.mp4").rate < 29.6
+    assert read_recording(two).rate is None

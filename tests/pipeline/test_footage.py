@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
+from films import encoded, pictures
 
 from shadowpuppet.body.anthropometry import sizes_from_height
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.io.person import Person, write_person
-from shadowpuppet.pipeline.footage import Sample, open_recording
+from shadowpuppet.pipeline.footage import Sample, open_footage, open_recording
 from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.survey.cautions import film_cautions
 
 
 @pytest.mark.parametrize(("times", "pace", "jitter"), [([0.0], np.nan, np.nan), ([1.0, 1.1], 0.1, 0.0), ([0, 0.1, 0.2, 0.5], 0.1, 0.0943)])
@@ -28,3 +31,22 @@ def test_the_height_of_known_sizes_is_the_scale_and_no_other_is_taken(tmp_path, 
     assert open_recording(recording, replace(known, height=1.72)).subject.height == 1.72
     with pytest.raises(SettingsError, match=r"height: found 1\.6 m, but \S+me\.toml has the sizes of a person of 1\.7 m"):
         open_recording(recording, replace(known, height=1.6))
+
+
+@pytest.mark.parametrize(("settings", "pixel"), [({"pixel": Fraction(4, 3)}, 4 / 3), ({"x264-params": "interlaced=1"}, 1.0)])
+def test_pixels_that_are_not_square_are_used_and_interlaced_films_named(tmp_path, settings, pixel):
+    film = encoded(tmp_path / "cam.mp4", pictures(size=(96, 64)), **settings)
+    footage = open_footage(film, make_options({"fov": 60}))
+    matrix = footage.view.camera.matrix
+    assert matrix[1, 1] / matrix[0, 0] == pytest.approx(pixel)
+    assert matrix[0, 0] == pytest.approx(48 / np.tan(np.pi / 6))
+    interlaced = ["the film is interlaced: every other row" in each for each in film_cautions(footage)]
+    assert interlaced == ([True] if "x264-params" in settings else [])
+
+
+def test_a_calibration_with_pixels_of_another_shape_than_the_film_says_is_named(tmp_path):
+    film = encoded(tmp_path / "cam.mp4", pictures(size=(96, 64)), pixel=Fraction(4, 3))
+    footage = open_footage(film, make_options({"fov": 60}))
+    square = replace(footage.view.camera, matrix=np.array([[80, 0, 48], [0, 80, 32], [0, 0, 1.0]]))
+    (caution,) = film_cautions(replace(footage, view=replace(footage.view, camera=square)))
+    assert "cam.mp4: the film says that its pixels are 1.33 times as wide as high, the calibration takes them for 1 times" in caution

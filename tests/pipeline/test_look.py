@@ -101,6 +101,16 @@ def test_ready_masks_need_no_background(recording, tmp_path):
         look_at(made.copied(recording, tmp_path / "without", without=["masks"]), Options(masks=True))
 
 
+def test_masks_black_on_white_are_the_same_as_white_on_black(recording, tmp_path):
+    other = made.copied(recording, tmp_path / "other")
+    made.write_film(other / "masks" / "cam.mkv", [255 - mask for mask in made.images(other / "masks" / "cam.mkv")], lossless=True)
+    for path in (other / "references").glob("*_mask.*"):
+        _write(path, 255 - made.images(path)[0])
+    right, found = (look_at(each, Options(masks=True)) for each in (recording, other))
+    assert found.background == "masks/cam.mkv, ready silhouettes, black on white"
+    assert (found.quality, found.person) == (right.quality, right.person)
+
+
 @pytest.mark.parametrize(("kind", "colour", "lossless"), [("masks", 255, True), ("video", (0, 0, 255), False)])
 def test_a_cable_is_left_out_of_the_silhouettes_and_said(recording, tmp_path, kind, colour, lossless):
     spoilt = made.copied(recording, tmp_path / "cable")

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -193,3 +194,16 @@ def test_the_plain_rule_is_called_noisy(shared):
     warnings = mask_quality(plain(frame.image) for frame in film).warnings()
     assert any("flicker" in w for w in warnings)
     assert any("parts beside the person" in w for w in warnings)
+
+
+@pytest.mark.parametrize("jumps", [0.0, 1.0])
+def test_complaints_about_ready_masks_speak_of_masks(jumps):
+    spoilt = replace(mask_quality([person()] * 3), frames=10, empty=2, full=2, first_empty=1, first_full=4, flicker=1, speck_area=1,
+                     holes=99, area_change=1, area_jumps=jumps, ready=True)
+    cautions, refusals = spoilt.warnings(), [replace(spoilt, **{kind: 10}).refusal() for kind in ("empty", "full")]
+    assert len(cautions) == 6
+    for said in (*cautions, *(each.short for each in cautions), *refusals):
+        assert not any(word in said for word in ("light", "scene", "background", "clothes", "colours", "camera", "method")), said
+    assert sum("masks" in said for said in (*cautions, *refusals)) == 8
+    made = replace(spoilt, ready=False)
+    assert all("masks" not in said for said in (*made.warnings(), replace(made, full=10).refusal()))

@@ -16,14 +16,17 @@ def pictures(n=12, size=(32, 24), grey=False, seed=1):
     return [np.roll(base, i, 1) for i in range(n)]
 
 
-def encoded(path, images, *, codec="libx264", pixels="yuv420p", stamps=None, base=Fraction(1, 1000), container=None, **settings):
-    """A film as other programs write it: any codec, pixel format and times (in units of `base`)."""
+def encoded(path, images, *, codec="libx264", pixels="yuv420p", stamps=None, base=Fraction(1, 1000), container=None,
+            pixel=None, **settings):
+    """A film as other programs write it: any codec, pixel format and times (in units of `base`); `pixel`: width of a pixel over height."""
     import av
 
     with av.open(str(path), "w", options=container or {}) as output:
         stream = output.add_stream(codec, rate=RATE, options=settings)
         stream.width, stream.height, stream.pix_fmt = images[0].shape[1], images[0].shape[0], pixels
         stream.codec_context.time_base = base
+        if pixel is not None:
+            stream.codec_context.sample_aspect_ratio = pixel
         for i, image in enumerate(images):
             frame = av.VideoFrame.from_ndarray(image, format="bgr24" if image.ndim == 3 else "gray")
             frame.pts, frame.time_base = (stamps[i] if stamps else round(i / RATE / base)), base

@@ -61,6 +61,16 @@ def test_mp4_films_come_back_nearly_and_even(tmp_path, size):
         assert far_apart(frame.image[: size[1], : size[0]], image) < 4
 
 
+@pytest.mark.parametrize(("settings", "pixel", "interlaced"), [
+    ({}, 1, False), ({"pixel": Fraction(4, 3)}, 4 / 3, False), ({"pixel": Fraction(8, 9), "x264-params": "interlaced=1"}, 8 / 9, True),
+])
+@pytest.mark.parametrize("name", ["a.mp4", "a.mkv", "a.ts"])
+def test_a_film_says_the_shape_of_its_pixels_and_whether_it_is_interlaced(tmp_path, name, settings, pixel, interlaced):
+    source = open_frames(encoded(tmp_path / name, pictures(size=(64, 32)), **settings), size=(32, 16))
+    assert source.pixel == pytest.approx(pixel)
+    assert source.interlaced == interlaced
+
+
 def test_a_film_is_read_again_from_the_start_and_by_two_readers(tmp_path):
     source = open_frames(film(tmp_path / "a.mkv", pictures(), lossless=True))
     one, other = iter(source), iter(source)

@@ -76,13 +76,13 @@ class Camera:
         return array
 
     @classmethod
-    def from_fov(cls, size: tuple[int, int], fov: float, name: str = "cam") -> Camera:
-        """A level camera at the world's origin, known only by its horizontal field of view (radians). The world is the camera's own: x
-        to its right, y along the optical axis, z up."""
+    def from_fov(cls, size: tuple[int, int], fov: float, name: str = "cam", pixel: float = 1.0) -> Camera:
+        """A level camera at the world's origin, known only by its horizontal field of view (radians) and the width of its pixels over their
+        height. The world is the camera's own: x to its right, y along the optical axis, z up."""
         if not 0 < fov < np.pi:
             raise CalibrationError(f"camera {name!r}: fov: found {np.degrees(fov):g} degrees, expected between 0 and 180")
         focal = size[0] / (2 * np.tan(fov / 2))
-        matrix = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1]])
+        matrix = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal * pixel, (size[1] - 1) / 2], [0, 0, 1]])
         level = rigid([[1, 0, 0], [0, 0, -1], [0, 1, 0]], np.zeros(3))
         return cls(name, size, matrix, T_camera_world=level, oriented=False)
 

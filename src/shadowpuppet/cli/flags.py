@@ -23,7 +23,7 @@ GROUPS = {
     **dict.fromkeys(("height", "distance", "facing", "body", "person", "prior", "appearance"), PERSON),
     **dict.fromkeys(("rate", "delay", "speed", "countdown", "learn", "still", "show", "listen", "port", "lag", "record"), LIVE),
     **dict.fromkeys(("osc", "websocket", "origin", "lsl", "lsl_scope"), PROGRAMS),
-    **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "region", "start", "end", "max_size", "every"),
+    **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "label", "region", "start", "end", "max_size", "every"),
                     PICTURES),
 }
 

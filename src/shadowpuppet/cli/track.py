@@ -41,7 +41,7 @@ else:
     KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "start", "end", "max_size", "every", "overlay", "appearance")
     DemoFlags = unpacked(flags_of(Options, without=KNOWN))
     """Options for recordings that are known."""
-    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "every", "overlay", "facing", "appearance", "training")))
+    SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "label", "every", "overlay", "facing", "appearance", "training")))
     """Options of a live session."""
     LiveFlags = unpacked(flags_of(LiveSettings))
 

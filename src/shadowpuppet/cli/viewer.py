@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     ViewFlags = Any
 else:
-    TRACKING = ("preset", "seed", "height", "distance", "body", "person", "prior", "masks", "overlay", "smooth", "cutoff", "gaps", "facing",
-                "appearance")
+    TRACKING = ("preset", "seed", "height", "distance", "body", "person", "prior", "masks", "label", "overlay", "smooth", "cutoff", "gaps",
+                "facing", "appearance")
     ViewFlags = unpacked(flags_of(Options, without=(*TRACKING, "start", "end")))
     """Options for looking at a recording."""
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, choices, warn
+from shadowpuppet.io.masks.ready_masks import MaskKind, mask_kind, open_masks
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.picture_sizes import differ_by_padding
 from shadowpuppet.io.recording import Recording, View, read_recording
@@ -60,11 +61,18 @@ class Footage:
     """The camera for images of the working size."""
     region: tuple[slice, slice] | None = None
     """Rows and columns where the person may be; None for all."""
+    label: int | None = None
+    """The person's label in ready silhouettes that are label images; None for the only one."""
 
     @cached_property
     def film(self) -> FrameSource:
         """The film; iterating over it gives its frames."""
         return open_frames(self.view.video, size=self.camera.size, rate=self.recording.rate)
+
+    @cached_property
+    def mask_kind(self) -> MaskKind:
+        """How the ready silhouettes are written. Raises `SilhouetteError` or `VideoError`."""
+        return MaskKind() if self.view.masks is None else mask_kind(self.view.masks, self.label)
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs, which opens the film itself."""
@@ -89,8 +97,8 @@ class Footage:
             passed += 1
             return passed == read
 
-        ready_ones = self.view.masks if ready else None
-        masks = None if ready_ones is None else open_frames(ready_ones, size=self.camera.size, whole=self.view.camera.size).read(of_masks)
+        ready_ones = open_masks(self.view.masks, self.mask_kind) if ready and self.view.masks is not None else None
+        masks = None if ready_ones is None else fitted(ready_ones, self.camera.size, self.view.camera.size).read(of_masks)
         for frame in self.film.read(of_film):
             if end is not None and frame.time - start > end - ROUNDING:
                 return
@@ -115,13 +123,14 @@ class Footage:
         assert self.view.background is not None
         return self.pictures(self.view.background, "the empty scene", len(self.recording.views) > 1)
 
-    def pictures(self, source: Path, what: str, sampled: bool = False) -> Iterator[Image]:
-        """Images of the same camera from another file, at the working size; `what` names them in messages. `sampled`: only those that a
-        sample of several cameras would have.
+    def pictures(self, source: Path, what: str, sampled: bool = False, masks: bool = False) -> Iterator[Image]:
+        """Images of the same camera, or `masks` of it, from another file, at the working size; `what` names them in messages. `sampled`:
+        only those that a sample of several cameras would have.
 
         Raises `RecordingError` if their size is not the film's, with or without the padding of H.264.
         """
         frames, (width, height) = open_frames(source), self.view.camera.size
+        frames = open_masks(source, mask_kind(source, self.label)) if masks else frames
         if frames.size != (width, height) and not differ_by_padding(frames.size, (width, height)):
             raise RecordingError(f"{source}: found {what} of {frames.size[0]} x {frames.size[1]} pixels, expected {width} x {height} "
                                  "as the film: it must come from the same camera at the same setting")
@@ -208,7 +217,7 @@ def camera_footage(recording: Recording, view: View, options: Options) -> Footag
         raise RecordingError(f"{recording.path}: no ready silhouettes in it, expected masks/{view.camera.name}.mkv or a folder of pictures "
                              f"masks/{view.camera.name}/; leave --masks out to make them")
     camera = view.camera.resized(worked_size(view.camera.size, options.max_size))
-    return Footage(recording, view, camera, region_of(options.region, view.camera, camera))
+    return Footage(recording, view, camera, region_of(options.region, view.camera, camera), options.label)
 
 
 def worked_size(size: tuple[int, int], longest: int) -> tuple[int, int]:

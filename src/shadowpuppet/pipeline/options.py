@@ -93,6 +93,8 @@ class Options:
     """Picture or film of the empty scene in place of the recording's own; one camera only."""
     masks: bool = False
     """Use the recording's ready silhouettes (masks/) instead of segmenting the film."""
+    label: Annotated[int, Field(ge=0)] | None = None
+    """The person's label where ready silhouettes are label images, such as PNG with a palette; by default the only one."""
     region: Annotated[tuple[int, int, int, int], BeforeValidator(_corners)] | None = None
     """Region of interest x0,y0,x1,y1, pixels of the film; everything outside is background. One camera only."""
     start: Annotated[str, BeforeValidator(moment_text)] | None = None

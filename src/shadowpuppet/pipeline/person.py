@@ -286,7 +286,7 @@ def _references(footage: Footage, silhouettes: Silhouettes) -> dict[str, Mask]:
 
 def _reference(footage: Footage, silhouettes: Silhouettes, reference: Reference) -> Mask:
     path = reference.image if silhouettes.segmenter is not None or reference.mask is None else reference.mask
-    images = (image for image, _ in zip(footage.pictures(path, "a reference"), range(LONGEST_REFERENCE)))
+    images = (image for image, _ in zip(footage.pictures(path, "a reference", masks=path is reference.mask), range(LONGEST_REFERENCE)))
     try:
         masks = [silhouettes.elsewhere(CameraFrame(0.0, image, image)) for image in images]
     except SilhouetteError as error:

@@ -120,7 +120,7 @@ def learn_silhouettes(footage: Footage, sample: Sample, options: Options, recove
     to be put into the pictures of the empty scene.
     """
     if options.masks:
-        return Silhouettes(f"{_short(footage.view.masks)}, ready silhouettes", None, footage.region)
+        return Silhouettes(f"{_short(footage.view.masks)}, ready silhouettes{footage.mask_kind.words}", None, footage.region)
     images = [frame.image for frame in sample.frames]
     if footage.view.background is not None:
         scene, source, recovered = footage.empty_scene(), _short(footage.view.background), None

@@ -29,6 +29,10 @@ WARN_HOLE_AREA = 0.1
 WARN_HOLES = 10
 
 
+ANEW = "the program that made the masks is unsure; make them anew, or leave --masks out"
+"""What is to be done about masks of another program."""
+
+
 @dataclass(frozen=True)
 class MaskQuality:
     """Quality measures of silhouettes. `warnings` says what is wrong with them, `refusal` whether tracking is hopeless."""
@@ -64,11 +68,18 @@ class MaskQuality:
     """The first empty frame, from 0."""
     first_full: int | None = None
     """The first full frame, from 0."""
+    ready: bool = False
+    """Whether another program made the silhouettes, so that light and empty scenes have no part in them."""
 
     def refusal(self) -> str | None:
         """Why tracking is hopeless, and the remedy, in a sentence; None if it is not."""
         if not self.frames:
             return "there is no silhouette: the film has no frames"
+        expected = "expected the person alone in white on black, in the alpha, or with a label (--label)"
+        if self.ready and self.empty > 0.9 * self.frames:
+            return f"the masks are empty in {self._share(self.empty)} of the frames; {expected}"
+        if self.ready and self.full > 0.5 * self.frames:
+            return f"the masks cover nearly all of the picture in {self._share(self.full)} of the frames; {expected}"
         if self.empty > 0.9 * self.frames:
             return (f"the silhouette is empty in {self._share(self.empty)} of the frames: nobody is in the picture, or "
                     "the person does not differ from the background; give a background of the same light, or set another method")
@@ -89,14 +100,18 @@ class MaskQuality:
 
     def _incomplete(self, cut_off: int) -> Iterator[Caution]:
         if self.empty:
+            why = ("or the masks miss them; cut the film, or make the masks anew" if self.ready else
+                   "or does not differ from the background; cut the film, or set another method")
             yield Caution(f"the silhouette is empty in {self._share(self.empty)} of the frames, first in frame {self.first_empty}: the "
-                          "person is out of the picture, or does not differ from the background; cut the film, or set another method",
+                          f"person is out of the picture, {why}",
                           f"nobody seen in {self._share(self.empty)} of frames: cut them",
                           HARMFUL if self.empty > 0.3 * self.frames else NOTED)
         if self.full:
+            why, short = (("make the masks anew", f"masks cover all at frame {self.first_full}: make them anew") if self.ready else
+                          ("the light changed or the camera moved; cut the film there, or fix camera and exposure",
+                           f"light or camera changed at frame {self.first_full}: --end {self.first_full}f"))
             yield Caution(f"nearly all of the picture is silhouette in {self._share(self.full)} of the frames, first in frame "
-                          f"{self.first_full}: the light changed or the camera moved; cut the film there, or fix camera and exposure",
-                          f"light or camera changed at frame {self.first_full}: --end {self.first_full}f", HARMFUL)
+                          f"{self.first_full}: {why}", short, HARMFUL)
         for side in self.cut_off:
             yield Caution(f"the silhouette touches the {side} border in {_percent(self.border[side])} of the frames: the person "
                           "is partly outside the picture, and what is outside is guessed; step back, or turn the camera",
@@ -106,9 +121,10 @@ class MaskQuality:
                           "camera with more pixels", "person is too small in the picture: go nearer", HARMFUL)
 
     def _unsteady(self) -> Iterator[Caution]:
-        remedy = ("the person hardly differs from the background, or was taken for it where it was made from the film; give a picture "
+        remedy = ANEW if self.ready else (
+                  "the person hardly differs from the background, or was taken for it where it was made from the film; give a picture "
                   "of the empty scene, more light, or other clothes")
-        short = "parts of the person vanish: film the empty scene"
+        short = "parts of the person vanish: " + ("make the masks anew" if self.ready else "film the empty scene")
         if self.area_jumps > WARN_JUMPS:
             yield Caution(f"the area of the silhouette changes by over {_percent(AREA_JUMP)} at once in {_percent(self.area_jumps)} of the "
                           f"frames, as parts are lost and found: {remedy}", short, HARMFUL)
@@ -116,19 +132,23 @@ class MaskQuality:
             yield Caution(f"the area of the silhouette changes by {_percent(self.area_change)} from frame to frame: {remedy}", short,
                           HARMFUL)
         if self.flicker > WARN_FLICKER:
-            yield Caution(f"pixels worth {_percent(self.flicker)} of the person's area flicker from frame to frame: noise in dim light, "
-                          "a lamp's flicker, or silhouettes that are not cleaned; use more light, or --silhouette.clean",
-                          "outlines flicker: use more light", HARMFUL)
+            why = ANEW if self.ready else ("noise in dim light, a lamp's flicker, or silhouettes that are not cleaned; use more light, or "
+                                           "--silhouette.clean")
+            yield Caution(f"pixels worth {_percent(self.flicker)} of the person's area flicker from frame to frame: {why}",
+                          f"outlines flicker: {'make the masks anew' if self.ready else 'use more light'}", HARMFUL)
 
     def _unclean(self) -> Iterator[Caution]:
         if self.speck_area > WARN_SPECK_AREA:
-            yield Caution(f"the silhouette has {self.specks:.1f} parts beside the person, {_percent(self.speck_area)} of its area: "
-                          "noise, shadow or another person; use --silhouette.clean, or keep others out of the picture",
-                          "noise, shadows or others beside the person: keep them out", HARMFUL)
+            why, short = (("make the masks of the person alone", "masks hold more than the person: make them anew") if self.ready else
+                          ("noise, shadow or another person; use --silhouette.clean, or keep others out of the picture",
+                           "noise, shadows or others beside the person: keep them out"))
+            yield Caution(f"the silhouette has {self.specks:.1f} parts beside the person, {_percent(self.speck_area)} of its area: {why}",
+                          short, HARMFUL)
         if self.hole_area > WARN_HOLE_AREA or self.holes > WARN_HOLES:
-            yield Caution(f"the silhouette has {self.holes:.1f} holes, {_percent(self.hole_area)} of its area: clothes like the "
-                          "background, or noise; try another method, or other clothes",
-                          "silhouettes have holes: wear other colours than the background", HARMFUL)
+            why, short = ((ANEW, "masks have holes: make them anew") if self.ready else
+                          ("clothes like the background, or noise; try another method, or other clothes",
+                           "silhouettes have holes: wear other colours than the background"))
+            yield Caution(f"the silhouette has {self.holes:.1f} holes, {_percent(self.hole_area)} of its area: {why}", short, HARMFUL)
 
     def _share(self, frames: int) -> str:
         return _percent(frames / self.frames)

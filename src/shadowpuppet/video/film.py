@@ -28,6 +28,8 @@ DEEP_LUMA = re.compile(r"yuv|p[024]1|gray1")
 """Pixel formats with more bits."""
 FULL_RANGE = 2
 """FFmpeg's AVCOL_RANGE_JPEG: luma over 0..255."""
+EVEN = 0.25
+"""Greatest difference of a steady film's times from even ones, over their interval: a missing frame makes half."""
 LONGEST_STUTTER = 1.0
 """Seconds; times that go back by more are taken for a restart of the clock."""
 STUDIO_TO_FULL = np.clip(np.round((np.arange(256) - 16) * (255 / 219)), 0, 255).astype(np.uint8)
@@ -49,15 +51,23 @@ def open_film(path: Path, grey: bool, rate: float | None) -> FrameSource:
         stated_rate = (stream.average_rate if timed else stream.guessed_rate) or stream.guessed_rate
         duration, mean_rate = _declared_duration(container, stream), float(stated_rate or math.nan)
         false = abs(stream.frames - duration * mean_rate) > 1 + 0.01 * stream.frames  # an .mp4 whose writer was interrupted
-        count = None if false else stream.frames or None
+        count, pixel = None if false else stream.frames or None, _pixel(stream, first)
 
     step = 1 / (mean_rate if math.isfinite(mean_rate) else rate or ASSUMED_RATE)
 
     def read(wanted: Wanted) -> Iterator[Frame]:
         return _frames(path, film, step, grey, rate, wanted)
 
-    film = FrameSource(str(path), size, rate or mean_rate, count, duration, read)
+    film = FrameSource(str(path), size, rate or mean_rate, count, duration, read, pixel, first.interlaced_frame)
     return film
+
+
+def _pixel(stream: VideoStream, first: VideoFrame) -> float:
+    """Width over height of a pixel in the upright picture, as the stream or else the container says; 1 if neither does."""
+    stated = stream.sample_aspect_ratio
+    if not stated or stated <= 0:
+        return 1.0
+    return float(1 / stated if round(first.rotation / 90) % 2 else stated)
 
 
 def tells_times(path: Path) -> bool:
@@ -66,6 +76,18 @@ def tells_times(path: Path) -> bool:
         frames = decoded(container, stream)
         return all(frame.pts is not None or frame.dts is not None for frame, _ in zip(frames, range(3)))
     return True  # damaged; reported elsewhere
+
+
+def is_steady(path: Path) -> bool:
+    """Whether a film's frames come at even intervals, none of them missing, by the times of its packets; False if it is damaged. Raises
+    `VideoError`."""
+    import av.error
+
+    with opened(path, threads=1) as (container, stream), contextlib.suppress(OSError, av.error.FFmpegError):
+        times = np.sort([packet.pts for packet in container.demux(stream) if packet.pts is not None])
+        even = np.linspace(times[0], times[-1], len(times)) if len(times) > 1 else times
+        return len(times) > 1 and bool(np.abs(times - even).max() < EVEN * (even[1] - even[0]))
+    return False
 
 
 def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float | None, wanted: Wanted) -> Iterator[Frame]:

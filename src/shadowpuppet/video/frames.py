@@ -65,6 +65,10 @@ class FrameSource:
     """Seconds; NaN if the container does not state it."""
     read: Callable[[Wanted], Iterator[Frame]] = field(repr=False)
     """The frames that are wanted; the others are passed over without making their pictures, and of most films without decoding them."""
+    pixel: float = 1.0
+    """Width of a pixel over its height, as the film says; 1 if it does not."""
+    interlaced: bool = False
+    """Whether each frame holds two moments, in every other row."""
 
     def __iter__(self) -> Iterator[Frame]:
         """Read from the start."""

@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +18,66 @@ from shadowpuppet.video.frames import ASSUMED_RATE, MOST_PIXELS, Frame, FrameSou
 from shadowpuppet.video.picture_header import read_header
 
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
+PNG, PNG_PALETTE = b"\x89PNG\r\n\x1a\n", b"\3"
+"""First bytes of a PNG, and its mark (byte 25) of a picture with a palette."""
+
+
+class Layers(NamedTuple):
+    """A picture with what `read_image` leaves out."""
+
+    image: Image
+    """As `read_image` gives it, (H, W) or (H, W, 3), not turned."""
+    alpha: Image | None = None
+    """Opacity (H, W), 0..255; None for a picture without."""
+    numbers: NDArray[np.uint16] | None = None
+    """Of each pixel (H, W) its place in a palette, or its grey value of 16 bit; None for other pictures."""
+    palette: bool = False
+    """Whether `numbers` are places in a palette."""
+    coloured: bool = False
+    """Whether these show colours, not only greys."""
 
 
 def read_image(path: str | Path, grey: bool = False) -> Image:
     """Read a picture, (H, W, 3) blue green red or (H, W) grey, 8 bit, rotated as its EXIF data say; its size is checked before it is
-    decoded. Raises `VideoError`. The only place where pictures are decoded."""
+    decoded. Raises `VideoError`."""
+    import cv2
+
+    return np.asarray(_decoded(path, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)[0], np.uint8)
+
+
+def read_layers(path: str | Path) -> Layers:
+    """Read a picture with its alpha, palette and depth. Raises `VideoError`, as `read_image` does."""
+    import cv2
+
+    found, data = _decoded(path, cv2.IMREAD_UNCHANGED)
+    image = np.asarray(found >> 8 if found.dtype == np.uint16 else found, np.uint8)
+    if found.ndim == 2 and found.dtype == np.uint16:
+        return Layers(image, numbers=found)
+    alpha = np.ascontiguousarray(image[..., 3]) if image.ndim == 3 and image.shape[2] == 4 else None
+    image = np.ascontiguousarray(image[..., :3]) if image.ndim == 3 else image
+    places = _palette_places(data) if data[25:26] == PNG_PALETTE and data.startswith(PNG) else None
+    return Layers(image, alpha, places, places is not None, places is not None and is_coloured(image))
+
+
+def is_coloured(image: Image) -> bool:
+    """Whether a picture (H, W, 3) or (H, W) has pixels that are not grey."""
+    return image.ndim == 3 and bool((image != image[..., :1]).any())
+
+
+def _palette_places(data: bytes) -> NDArray[np.uint16] | None:
+    """Place (H, W) of each pixel of a PNG in its palette, which OpenCV does not give; None if it is damaged."""
+    import av
+    import av.error
+
+    with contextlib.suppress(av.error.FFmpegError, ValueError):
+        for frame in av.CodecContext.create("png", "r").decode(av.Packet(data)):
+            if isinstance(frame, av.VideoFrame) and frame.format.name == "pal8":
+                return frame.to_ndarray()[0].astype(np.uint16)
+    return None
+
+
+def _decoded(path: str | Path, how: int) -> tuple[NDArray[Any], bytes]:
+    """A picture, decoded as `how` says, and its file's bytes: the only place where picture files are opened."""
     import cv2
 
     with within_memory(path):
@@ -32,13 +88,13 @@ def read_image(path: str | Path, grey: bool = False) -> Image:
                              f"{header.most} while it is decoded; expected at most {MOST_PIXELS}: scale it")
         try:
             if header is not None:
-                image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
+                image = cv2.imdecode(np.frombuffer(data, np.uint8), how)
         except cv2.error as error:
             if is_out_of_memory(error):
                 raise
     if image is None:
         raise VideoError(f"{path}: not a picture that can be read (damaged, or none of {choices(IMAGE_SUFFIXES)})")
-    return np.asarray(image, np.uint8)
+    return image, data
 
 
 def _content(path: Path) -> bytes:

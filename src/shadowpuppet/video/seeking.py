@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, NamedTuple, Self
@@ -32,13 +32,14 @@ class Seeker:
     the frame that `at` returned last, NaN if it was None.
     """
 
-    def __init__(self, source: Path, size: Size, rate: float | None = None) -> None:
-        """`size`: of the frames; `rate`: frames/s, in place of the film's times. Raises `VideoError` if nothing can be read."""
+    def __init__(self, source: Path, size: Size, rate: float | None = None, read: Callable[[Path], Image] = read_image) -> None:
+        """`size`: of the frames; `rate`: frames/s, in place of the film's times; `read`: reads a picture file. Raises `VideoError` if
+        nothing can be read."""
         self.source, self.size, self.rate, self.shown = source, size, rate, np.nan
         if source.is_dir():
-            self._roll: _Folder | _Film | _Still = _Folder(source, rate)
+            self._roll: _Folder | _Film | _Still = _Folder(source, rate, read)
         elif source.suffix.lower() in IMAGE_SUFFIXES:
-            self._roll = _Still(source)
+            self._roll = _Still(source, read)
         else:
             self._roll = _Film(source, rate)
 
@@ -69,8 +70,8 @@ class Seeker:
 class _Still:
     """A single picture, shown at every time."""
 
-    def __init__(self, path: Path) -> None:
-        self.image = read_image(path)
+    def __init__(self, path: Path, read: Callable[[Path], Image]) -> None:
+        self.image = read(path)
 
     def at(self, time: float) -> tuple[Image, float]:
         return self.image, time
@@ -82,15 +83,16 @@ class _Still:
 class _Folder:
     """Pictures of a folder by time."""
 
-    def __init__(self, folder: Path, rate: float | None) -> None:
+    def __init__(self, folder: Path, rate: float | None, read: Callable[[Path], Image]) -> None:
         self.paths, self.times, _ = in_folder(folder, rate)
-        read_image(self.paths[0])
+        self.read = read
+        read(self.paths[0])
         self.step = float(np.median(np.diff(self.times))) if len(self.times) > 1 else np.inf
 
     def at(self, time: float) -> tuple[Image | None, float]:
         n = int(np.abs(self.times - time).argmin())
         there = abs(self.times[n] - time) <= 1.5 * self.step
-        return (read_image(self.paths[n]), float(self.times[n])) if there else (None, np.nan)
+        return (self.read(self.paths[n]), float(self.times[n])) if there else (None, np.nan)
 
     def close(self) -> None:
         """Nothing is open."""

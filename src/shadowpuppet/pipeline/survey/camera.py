@@ -24,6 +24,7 @@ from shadowpuppet.pipeline.survey.cautions import (
     clutter_cautions,
     condition_cautions,
     feet_cautions,
+    film_cautions,
     recovery_cautions,
     recovery_doubt,
     sitting_cautions,
@@ -78,7 +79,7 @@ def _look(footage: Footage, film: FilmSurvey, whole: bool) -> Look:
         return look
     posture = (feet_cautions({camera.name: look.quality.border["bottom"]}) if whole
                else sitting_cautions(film.masks, [frame.time for frame in sample.frames]))
-    doubts = (*_several_people(film), *posture, *_doubts(look, footage),
+    doubts = (*_several_people(film), *posture, *_doubts(look, footage), *film_cautions(footage),
               *recovery_cautions([camera.name], [film.silhouettes]), *clutter_cautions(look.left_out))
     return replace(look, doubts=(*doubts, *look.quality.warnings()))
 

@@ -9,6 +9,7 @@ import numpy as np
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
 from shadowpuppet.geometry import Array
+from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.silhouette.correction.condition import FilmCondition
 
@@ -16,6 +17,8 @@ GOOD = 0.9
 """Overlap with ready silhouettes below which the segmentation is in doubt."""
 AT_TIMES, MOSTLY = 0.1, 0.5
 """Shares of a camera's frames with cut off feet from which on that is worth a word, and it does not show them."""
+SHAPE = 0.03
+"""Relative difference in the shapes of pixels, width over height, from which on a calibration is not the film's."""
 LOWER, SMALLER, OFTEN = 0.25, 0.75, 0.1
 """How much lower the silhouette's top is, over the root of its area, and how large that area at most, over those while the person stands,
 where they sit; and the least share of such frames. Who bows keeps the area, who turns the height."""
@@ -86,6 +89,21 @@ def sitting_cautions(masks: Sequence[Mask], times: Sequence[float]) -> list[Caut
                     "picture: they sit down, kneel or go away, which an upper body cannot follow; cut the film with --start and --end, or "
                     "track the whole body with --body anatomical, its feet in the picture",
                     f"person sits or kneels at {since:.1f} s: cut, or --body anatomical", HARMFUL)]
+
+
+def film_cautions(footage: Footage) -> list[Caution]:
+    """What to know of how a camera's film was stored: rows of two moments, and pixels of another shape than the calibration's."""
+    film, matrix, said = footage.film, footage.view.camera.matrix, list[Caution]()
+    if film.interlaced:
+        said.append(Caution(f"{footage.view.video}: the film is interlaced: every other row of a frame is of another moment, which frays "
+                            "the outline of what moves; deinterlace it (ffmpeg -vf bwdif)", "film is interlaced: deinterlace it", NOTED))
+    calibrated = float(matrix[1, 1] / matrix[0, 0])
+    if abs(film.pixel - 1) > SHAPE and abs(calibrated / film.pixel - 1) > SHAPE:
+        said.append(Caution(f"{footage.view.video}: the film says that its pixels are {film.pixel:.3g} times as wide as high, the "
+                            f"calibration takes them for {calibrated:.3g} times: calibrate with pictures of this film, or give it with "
+                            "square pixels (ffmpeg -vf scale=iw*sar:ih,setsar=1)", "pixels of film and calibration differ in shape",
+                            HARMFUL))
+    return said
 
 
 def unlike_ready(overlap: float) -> Caution:

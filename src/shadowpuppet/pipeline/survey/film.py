@@ -59,7 +59,7 @@ def survey_film(footage: Footage, options: Options, longest: int = LOOKED_AT, hi
         "size": footage.view.camera.size, "worked_size": camera.size, "background": silhouettes.source,
         "fov": float(np.degrees(2 * np.arctan(camera.size[0] / 2 / camera.matrix[0, 0]))),
         "key": "none" if silhouettes.segmenter is None else silhouettes.segmenter.reason,
-        "exact_overlap": mean_overlap(masks, exact), "quality": quality_of(runs, sample.starts),
+        "exact_overlap": mean_overlap(masks, exact), "quality": quality_of(runs, sample.starts, silhouettes.segmenter is None),
         "left_out": _left_out(silhouettes, footage),
         "condition": condition_of(silhouettes, sample, runs),
     })  # fmt: skip
@@ -126,8 +126,9 @@ def mean_overlap(masks: Sequence[Mask], exact: Sequence[Mask]) -> float | None:
     return float(np.nanmean(overlaps)) if np.isfinite(overlaps).any() else None
 
 
-def quality_of(runs: Sequence[Sequence[Mask]], starts: Sequence[int]) -> MaskQuality:
-    """Quality of masks in several `runs` of consecutive frames, which begin at frames `starts`; frames are compared within a run only."""
+def quality_of(runs: Sequence[Sequence[Mask]], starts: Sequence[int], ready: bool = False) -> MaskQuality:
+    """Quality of masks, `ready` or made, in several `runs` of consecutive frames, which begin at frames `starts`; frames are compared
+    within a run only."""
     parts = [mask_quality(run) for run in runs]
     frames = np.array([part.frames for part in parts], float)
 
@@ -145,5 +146,5 @@ def quality_of(runs: Sequence[Sequence[Mask]], starts: Sequence[int]) -> MaskQua
         frames=int(frames.sum()), area=median("area"), area_change=median("area_change"), area_jumps=mean("area_jumps"),
         flicker=median("flicker"), border=border, specks=mean("specks"), speck_area=mean("speck_area"), holes=mean("holes"),
         hole_area=mean("hole_area"), empty=sum(part.empty for part in parts), full=sum(part.full for part in parts),
-        first_empty=first("first_empty"), first_full=first("first_full"),
+        first_empty=first("first_empty"), first_full=first("first_full"), ready=ready,
     )  # fmt: skip

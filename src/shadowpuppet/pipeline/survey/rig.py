@@ -18,7 +18,15 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.census import Census, later_sets, sampled_sets, take_census
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
-from shadowpuppet.pipeline.survey.cautions import GOOD, clutter_cautions, condition_cautions, feet_cautions, recovery_cautions, unlike_ready
+from shadowpuppet.pipeline.survey.cautions import (
+    GOOD,
+    clutter_cautions,
+    condition_cautions,
+    feet_cautions,
+    film_cautions,
+    recovery_cautions,
+    unlike_ready,
+)
 from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, of_several, survey_film
 from shadowpuppet.pipeline.survey.opening import OPENING, first_seconds, opening_of
 from shadowpuppet.silhouette.added import SceneHint
@@ -68,6 +76,7 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     refusal = _rig_refusal(look, first)
     recovered = frozenset(camera.name for camera, each in zip(look.cameras, silhouettes, strict=True) if each.recovered is not None)
     doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
+    doubts += [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
     if several:
         doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
                                  f"{several} people: each is tracked", NOTED))
@@ -132,6 +141,9 @@ def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
         return "; ".join(f"camera {name!r}: {why}" for name, why in bad[:2])
     sets = (first.masks[n] for n in range(len(first.masks)))  # one after another: the first will do, and the others need not be made
     if not any(sum(mask is not None and may_be_person(mask) for mask in masks) > 1 for masks in sets):
+        if all(camera.quality.ready for camera in look.cameras):
+            return (f"the masks of no two cameras show a person at the same time within the first {OPENING:g} s: is mask n of each camera "
+                    "frame n of its film, and do the masks hold the person?")
         return (f"no two cameras see a person at the same time within the first {OPENING:g} s: do the films belong together, and begin "
                 "together? say in [start] of recording.toml when each began")
     return look.agreement.refusal()

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import SilhouetteError, VideoError, warn
+from shadowpuppet.io.masks.ready_masks import are_pictures, read_mask
 from shadowpuppet.pipeline.footage import LOOKED_AT, CameraFrame, Footage, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.silhouettes import Silhouettes, uncluttered_silhouettes
@@ -35,10 +37,22 @@ class FilmImages:
         view, rate = footage.view, footage.recording.rate
         assert not isinstance(view.video, (int, str))
         self._film = Seeker(view.video, footage.camera.size, rate)
-        self._ready = Seeker(view.masks, footage.camera.size, rate) if view.masks is not None and options.masks else None
+        self._ready = self._masks(view.masks, rate) if view.masks is not None and options.masks else None
         self.trouble = ""
         self._pictured: tuple[float, Image | None] = (np.nan, None)
         self._masked: tuple[float, Mask | None] = (np.nan, None)
+
+    @property
+    def _film_inverted(self) -> bool:
+        """Whether the ready silhouettes are a film, black on white."""
+        return self.footage.mask_kind.inverted and self._ready is not None and not are_pictures(self._ready.source)
+
+    def _masks(self, masks: Path, rate: float | None) -> Seeker:
+        """The recording's silhouettes; those of a folder are numbered as the film's frames, whose rate is theirs."""
+        kind, size, film = self.footage.mask_kind, self.footage.camera.size, self.footage.film
+        if rate is None and masks.is_dir() and np.isfinite(film.rate):
+            rate = film.rate
+        return Seeker(masks, size, rate, lambda path: read_mask(path, kind))
 
     def picture(self, time: float) -> Image | None:
         """Picture (H, W, 3), BGR."""
@@ -64,7 +78,7 @@ class FilmImages:
     def _mask(self, time: float) -> Mask | None:
         if self._ready is not None:
             image = self._ready.at(time + self.footage.view.start) if self._is_within(time) else None
-            return None if image is None else ready_mask(image)
+            return None if image is None else ready_mask(np.invert(image) if self._film_inverted else image)
         image = self.picture(time)
         return None if image is None else self._silhouettes(CameraFrame(time, image, None))
 
