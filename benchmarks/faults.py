@@ -133,7 +133,7 @@ def _measured(path: Path, seed: int, truth: JointTable, seen: Sequence[bool], ex
     alike = np.full(len(motion), np.nan)
     for frames in cache.frames((one for one in ()), options):
         n, at = int(np.abs(motion.times - frames.time).argmin()), round(frames.time * rate)
-        values = [overlap(mask, own[at]) for mask, own in zip(frames.masks, exact) if mask is not None and at < len(own)]
+        values = [overlap(mask, own[at]) for mask, own in zip(frames.seen.masks, exact) if mask is not None and at < len(own)]
         alike[n] = np.nanmean(values) if np.isfinite(values).any() else np.nan
     shutil.rmtree(path / "run")
     vouched = (motion.limb_status == "tracked").any(1)

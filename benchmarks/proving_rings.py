@@ -34,6 +34,7 @@ from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import Sizes
 from shadowpuppet.camera.colour_codes import colour_codes
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
@@ -109,9 +110,9 @@ class Case:
         self.survey = survey_rig(self.rig, make_options({"masks": masks}))
         truth = read_joints(self.rig.recording.truth)  # pyright: ignore[reportArgumentType]
         self.times, self.store = list[float](), MaskStore(limit=10**12)
-        for seen in read_frames(self.rig, [each.segmented for each in self.survey.silhouettes], ready=masks):
-            self.times.append(seen.time)
-            self.store.add(seen.time, seen.masks, codes=tuple(map(colour_codes, seen.corrected)))
+        for each in read_frames(self.rig, [each.segmented for each in self.survey.silhouettes], ready=masks):
+            self.times.append(each.time)
+            self.store.add(each.time, Seen(each.seen.masks, codes=tuple(map(colour_codes, each.corrected))))
             if len(self.times) == frames:
                 break
         known = truth.times <= self.times[-1] + 1e-6
@@ -137,10 +138,10 @@ class Case:
         sets = list(self.store)
         if (at := repr(settings.hull)) not in self.hulls:
             hull, start = VisualHull(self.rig.cameras, settings.hull), time.process_time()
-            self.hulls[at] = [hull.points(seen.masks) for seen in sets], time.process_time() - start
+            self.hulls[at] = [hull.points(each.seen.masks) for each in sets], time.process_time() - start
         points, spent = self.hulls[at]
         rng, state, poses, start = np.random.default_rng([seed, 1]), None, list[Array](), time.process_time()
-        for surface, seen in zip(points, sets):
+        for surface, (_, _, seen, *_) in zip(points, sets):
             state = (tracker.start(rng, surface, seen.masks) if state is None
                      else tracker.step(rng, state, surface, seen.masks, codes=seen.codes))  # fmt: skip
             poses.append(np.where(state.status in ("lost", "absent"), np.nan, state.pose))

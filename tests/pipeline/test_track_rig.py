@@ -192,8 +192,9 @@ def test_a_camera_that_freezes_is_set_aside_and_named(recording, tmp_path, monke
     def frozen(*arguments, **named):
         held = None
         for n, seen in enumerate(read_frames(*arguments, **named)):
-            held = seen.masks[1] if n < 3 else held
-            yield seen._replace(masks=(seen.masks[0], held, *seen.masks[2:]))
+            masks = seen.seen.masks
+            held = masks[1] if n < 3 else held
+            yield seen._replace(seen=seen.seen._replace(masks=(masks[0], held, *masks[2:])))
 
     monkeypatch.setattr("shadowpuppet.pipeline.frame_process.read_frames", frozen)
     with pytest.warns(ShadowPuppetWarning, match="left out for a time \\(camera 'cam2', frozen from"):

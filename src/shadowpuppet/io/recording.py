@@ -303,8 +303,8 @@ def _cameras(folder: Path, films: dict[str, Any], fov: float | None, calibration
             film = spelled_as(films, [name]).get(name)
             return open_frames(film).size if film is not None and camera_number(film) is None else None
 
-        told = {key: notes.choice(key, known) for key, known in (("unit", UNITS), ("up", UPS))} if notes else {}
-        return read_calibration(calibration, sizes=size, **told)
+        unit, up = (notes.choice(key, known) if notes else None for key, known in (("unit", UNITS), ("up", UPS)))
+        return read_calibration(calibration, unit=unit, up=up, sizes=size)
     if len(films) > 1:
         by_board, by_person = (typed("calibrate", folder, *more) for more in ((), ("--from-person", "--height", "METRES")))
         raise UncalibratedError(f"{folder}: no calibration.toml for its {len(films)} cameras ({choices(films)}); several cameras must be "
