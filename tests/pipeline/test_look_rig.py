@@ -256,7 +256,7 @@ def test_nobody_at_the_same_time_is_refused_before_the_run(tmp_path):
     seen = made_rig.masks(cameras, 12)
     seen = [[mask if k == n % 3 else np.zeros_like(mask) for k, mask in enumerate(row)] for n, row in enumerate(seen)]
     recording = made_rig.write(tmp_path / "r", cameras, seen)
-    assert "no two cameras see a person at the same time" in looked(recording).refusal
+    assert "the masks of no two cameras show a person at the same time" in looked(recording).refusal
     with pytest.raises(TrackingError, match="no two cameras"):
         track_recording(recording, tmp_path / "run", MASKS)
     assert not (tmp_path / "run").exists()

@@ -171,7 +171,7 @@ def test_a_run_that_cannot_begin_leaves_no_folder(recording, tmp_path):
 def test_nobody_at_all_is_refused(tmp_path):
     cameras = made_rig.cameras()
     recording = made_rig.write(tmp_path / "r", cameras, [[np.zeros(made_rig.SIZE[::-1], bool)] * len(cameras)] * 12)
-    with pytest.raises(TrackingError, match="camera 'cam1': the silhouette is empty"):
+    with pytest.raises(TrackingError, match="camera 'cam1': the masks are empty in 100 %"):
         track(recording, tmp_path / "run")
     assert look_at(recording, Options(masks=True)).refusal is not None
 
