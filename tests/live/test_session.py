@@ -445,6 +445,7 @@ def test_the_background_can_be_learnt_again_and_the_person_stays(pictures, track
     after = stage.play(brighter[len(empty) + 5 : len(empty) + 12])
     assert stage.session.measured is fit
     assert after[-1].frame.status == "tracked"
+    assert stage.session.timing.dropped == 0
 
 
 def test_a_person_can_be_measured_again_with_the_sizes_known(pictures, tracking):

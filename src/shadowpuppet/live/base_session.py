@@ -288,8 +288,14 @@ class LiveSession(ABC, Generic[Shot, State, Observation, Before]):
         return tuple(Given(frame, now - self._waiting.pop(frame.time).captured) for frame in frames)
 
     def _begin_tracking(self, subject: TrackedSubject[State, Observation, Before]) -> None:
+        if self.phase != "tracking":  # a person measured again while tracked leaves no gap in the pictures
+            self.timing.pause()
         self.subject, self.phase, self._state, self._before, self._new = subject, "tracking", None, None, True
         self._lagging = FixedLag(MotionSmoother(subject.body.skeleton, subject.joints), self.lag) if self.lag else None
+
+    def _track_again(self) -> None:
+        """Track the same person after pictures that were not tracked."""
+        self.phase, self._state, self._before = "tracking", None, None
         self.timing.pause()
 
     def _pause(self, trouble: str) -> Outcome:

@@ -147,7 +147,10 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
     def _learnt(self, found: Sequence[Scene]) -> None:
         self._seen_before(found)
         self._due, self._between, self._found_again = self.clock() + FIRST_REFINED, FIRST_REFINED, None
-        self.phase, self._state, self._before = ("tracking" if self.subject else "waiting"), None, None
+        if self.subject:
+            self._track_again()
+        else:
+            self.phase = "waiting"
 
     def _seen_before(self, found: Sequence[Scene]) -> None:
         """Use new silhouettes before the scenes."""

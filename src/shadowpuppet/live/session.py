@@ -158,7 +158,7 @@ class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
         if found.fit is not None:
             self._begin(found.fit)
         elif self.fit is not None and not found.tried:
-            self.phase, self._state, self._before = "tracking", None, None
+            self._track_again()
         else:
             self.phase = "waiting"
             self._wait_again("no person's shape: stand whole in the picture, facing the camera" if found.tried else "")
