@@ -8,10 +8,10 @@ import numpy as np
 
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec, Viewpoint
 from shadowpuppet.synthetic.person.clothes import Clothes
-from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import Figure
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
+from shadowpuppet.synthetic.scene_renderer import dressed
 from shadowpuppet.video import write_image
 
 TARGET = Path(__file__).parent / "assets" / "motions.png"

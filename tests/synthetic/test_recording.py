@@ -32,13 +32,12 @@ from shadowpuppet.synthetic import (
 from shadowpuppet.synthetic.movement import gestures
 from shadowpuppet.synthetic.movement.sequence import sequence_seconds
 from shadowpuppet.synthetic.person.clothes import Clothes
-from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import CHANNELS, SEGMENTS, pose
 from shadowpuppet.synthetic.person.mannequin import FRACTIONS, JOINTS, MEASURES
 from shadowpuppet.synthetic.person.surface import Surface, ellipsoid
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.synthetic.scene_renderer import Place, SceneRenderer
+from shadowpuppet.synthetic.scene_renderer import Place, SceneRenderer, dressed
 from shadowpuppet.synthetic.truth import SOLES
 from shadowpuppet.video import open_frames, read_image
 

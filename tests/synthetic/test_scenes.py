@@ -19,14 +19,13 @@ from shadowpuppet.synthetic.compositing import FAR, Layer, composite, composite_
 from shadowpuppet.synthetic.furniture import SHAPES, Furniture
 from shadowpuppet.synthetic.movement import gestures
 from shadowpuppet.synthetic.person.clothes import Clothes
-from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import SEGMENTS, Figure, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.person.surface import Surface, ellipsoid
 from shadowpuppet.synthetic.person_renderer import PersonRenderer, _covering
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.room import lamp_brightness
-from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
+from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body, dressed
 from shadowpuppet.synthetic.viewpoint import BODY_CENTRE, RING_JITTER, RING_SCALE_JITTER
 from shadowpuppet.video import open_frames
 

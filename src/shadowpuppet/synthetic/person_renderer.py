@@ -91,11 +91,11 @@ def _unit(v: Array) -> Array:
     return np.ascontiguousarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
 
 
-def _covering(origin: Array, axes: Array, s: Surface, count: int = 4) -> Array:
-    """Spheres (P, count, 4) that cover each part with its caps and half its blend."""
+def _covering(origin: Array, axes: Array, s: Surface) -> Array:
+    """Spheres (P, 4, 4) that cover each part with its caps and half its blend."""
     low, high = -s.caps[:, 0], s.length + s.caps[:, 1]
-    step = (high - low) / count
-    along = low[:, None] + step[:, None] * (np.arange(count) + 0.5)
+    step = (high - low) / 4
+    along = low[:, None] + step[:, None] * (np.arange(4) + 0.5)
     centres = origin[:, None] + axes[:, None, :, 2] * along[..., None]
     radius = np.hypot(s.radius, step / 2) + 0.5 * s.blend + 0.005
     return np.concatenate([centres, np.broadcast_to(radius[:, None, None], (*along.shape, 1))], -1)

@@ -15,9 +15,12 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.compositing import Layer, composite, composite_people, visible
 from shadowpuppet.synthetic.faults.camera_faults import CameraFaults
 from shadowpuppet.synthetic.person.clothes import Clothes
-from shadowpuppet.synthetic.person.dressed import dressed
+from shadowpuppet.synthetic.person.head import head
 from shadowpuppet.synthetic.person.kinematics import Figure
+from shadowpuppet.synthetic.person.limbs import arm, leg
 from shadowpuppet.synthetic.person.mannequin import Mannequin
+from shadowpuppet.synthetic.person.surface import Surface
+from shadowpuppet.synthetic.person.trunk import shoulders, trunk
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.room import Room, expose, lamp_brightness
 from shadowpuppet.synthetic.spec import Bystander, Spec
@@ -161,6 +164,12 @@ class SceneRenderer:
         bright = lamp_brightness(scene, seconds, self._length)
         light = self.faults.lit(light if bright == 1 else bright * light, index, seconds)
         return expose(light, self.faults.noise(scene.noise, index), self.rng)[..., ::-1]
+
+
+def dressed(body: Mannequin, clothes: Clothes) -> Surface:
+    """The surface of `body` in `clothes`."""
+    left = [*arm(body, clothes), *leg(body, clothes)]
+    return Surface.of([*trunk(body, clothes), *shoulders(body, clothes), *head(body, clothes), *left, *(loft.mirrored() for loft in left)])
 
 
 def bystander_body(bystander: Bystander) -> Mannequin:

@@ -520,8 +520,8 @@ def test_the_mean_man_and_woman_have_the_mass_index_of_the_survey(rng):
 
     from shadowpuppet.synthetic import Viewpoint
     from shadowpuppet.synthetic.person.clothes import Clothes
-    from shadowpuppet.synthetic.person.dressed import dressed
     from shadowpuppet.synthetic.person_renderer import PersonRenderer
+    from shadowpuppet.synthetic.scene_renderer import dressed
 
     bare = Clothes(looseness=0.0)
     for stature, build, wanted in ((1.629, 0.0, 25.6), (1.756, 1.0, 27.8)):

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec
 from shadowpuppet.synthetic.movement.resting import LYING_GESTURES, seat_height
 from shadowpuppet.synthetic.person.clothes import Clothes
-from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import SEGMENTS, Figure
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import feet_of, perform
+from shadowpuppet.synthetic.scene_renderer import dressed
 
 bodies = st.builds(lambda seed, kind: Mannequin.draw(np.random.default_rng(seed), kind), st.integers(0, 500),
                    st.sampled_from(["woman", "man", "child"]))  # fmt: skip

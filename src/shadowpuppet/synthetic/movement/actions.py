@@ -85,12 +85,7 @@ def sit(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMo
     """Sitting down on an invisible seat, the hands on the thighs, and standing up again."""
     lean = both(front=22, side=10, elbow=45, curl=15, supination=-10) | trunk(pelvis_bow=40, spine_bow=16, head_nod=-14)
     seat = both(front=20, side=10, elbow=62, curl=15, supination=-20) | trunk(pelvis_bow=-4, spine_bow=8)
-    deep = rng.uniform(0.40, 0.46)
-    low: Posture = {"drop": deep, "ahead": -0.42}
-    half: Posture = {"drop": 0.6 * deep, "ahead": -0.30}
-    pace = min(seconds / 4.0, 1.0)
-    return KeyframeMotion(body, seconds, [(1.0 * pace, lean | half), (1.5 * pace, seat | low), (seconds - 1.5 * pace, seat | low),
-                               (seconds - 1.0 * pace, lean | half)])  # fmt: skip
+    return _seated(body, seconds, lean, seat | {"drop": rng.uniform(0.40, 0.46), "ahead": -0.42})
 
 
 def sit_down(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
@@ -99,11 +94,13 @@ def sit_down(body: Mannequin, seconds: float, rng: np.random.Generator) -> Keyfr
     seat = both(front=rng.uniform(18, 24), side=11, roll=-30, elbow=52, supination=-57, curl=20) | trunk(pelvis_bow=-4, spine_bow=8)
     leg = body.length("thigh") + body.length("shank")
     deep = (leg + Sole.of(body).ankle + 0.02 - seated_pelvis(body)) / leg
-    low: Posture = {"drop": deep, "ahead": -BACKWARD}
-    half: Posture = {"drop": 0.6 * deep, "ahead": -0.30}
-    pace = min(seconds / 4.0, 1.0)
-    return KeyframeMotion(body, seconds, [(1.0 * pace, lean | half), (1.5 * pace, seat | low), (seconds - 1.5 * pace, seat | low),
-                               (seconds - 1.0 * pace, lean | half)])  # fmt: skip
+    return _seated(body, seconds, lean, seat | {"drop": deep, "ahead": -BACKWARD})
+
+
+def _seated(body: Mannequin, seconds: float, lean: Posture, low: Posture) -> KeyframeMotion:
+    """Down to the posture `low` and up again, leaning on both ways."""
+    half, pace = lean | {"drop": 0.6 * low["drop"], "ahead": -0.30}, min(seconds / 4.0, 1.0)
+    return KeyframeMotion(body, seconds, [(1.0 * pace, half), (1.5 * pace, low), (seconds - 1.5 * pace, low), (seconds - 1.0 * pace, half)])
 
 
 def kneel(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:

@@ -158,13 +158,13 @@ def random(seconds: float, rng: np.random.Generator) -> Keys:
     return [(float(when), dict(zip(CHANNELS, map(float, row)))) for when, row in zip(t, table)]
 
 
-def clear_of_trunk(table: Array, rounds: int = 12) -> Array:
+def clear_of_trunk(table: Array) -> Array:
     """Key postures (n, `CHANNELS`) with the arms moved outward and straightened if forearm or hand would enter trunk or head.
 
     Tested on the mean body with trunk and head as round sticks; the change is spread over neighbouring keys to keep the motion smooth.
     """
     table, body = table.copy(), Mannequin()
-    for _ in range(rounds):
+    for _ in range(12):
         figure = pose(body, table)
         joint = dict(zip(JOINTS, figure.joints.swapaxes(0, 1)))
         crown = joint["head"] + 0.6 * (joint["head"] - joint["neck"])

@@ -98,7 +98,7 @@ def animate(body: Mannequin, gestures: Sequence[Gesture], t: Array, rng: np.rand
     restless = still * involuntary_motion(t, rng)
     sway = restless[:, [CHANNELS.index("sway_x"), CHANNELS.index("sway_y")]]
     postures = clamp_joints(postures + restless)
-    shift = _middle(parts, turn) if _goes(gestures) else np.zeros(3)
+    shift = _middle(parts, turn) if any(gesture.motion in ("walk", "jog") for gesture in gestures) else np.zeros(3)
     moved = stance._replace(pelvis=stance.pelvis - shift + np.column_stack([sway, 0 * t]), ankles=stance.ankles - shift)
     return pose_over(body, postures, moved, SOFT_LIMIT)
 
@@ -108,11 +108,6 @@ def _middle(parts: Sequence[MotionPart], turn: float) -> Array:
     whole = np.arange(0, LEAD_SECONDS + sum(part.seconds for part in parts), 0.05)
     places = _joined(parts, whole, turn)[1].pelvis[:, :2]
     return np.append((places.max(0) + places.min(0)) / 2, 0.0)
-
-
-def _goes(gestures: Sequence[Gesture]) -> bool:
-    """Whether any part is walking or jogging."""
-    return any(gesture.motion in ("walk", "jog") for gesture in gestures)
 
 
 def _parts(body: Mannequin, gestures: Sequence[Gesture], rng: np.random.Generator) -> list[MotionPart]:
