@@ -23,7 +23,7 @@ from papers.ni2008.inputs import Case, Source
 from papers.ni2008.models import limbs_of
 from papers.ni2008.reading import drawn
 from papers.ni2008.recordings import humaneva
-from shadowpuppet.body.bones import BONES
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.motion.prior.settings import PriorSettings

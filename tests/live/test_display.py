@@ -20,9 +20,8 @@ from hypothesis import strategies as st
 from shadowpuppet import network, page_server
 from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
 from shadowpuppet.live.display import web
-from shadowpuppet.live.display.choice import open_display
 from shadowpuppet.live.display.drawing import drawn
-from shadowpuppet.live.display.view import Angle, Display, View
+from shadowpuppet.live.display.view import Angle, Display, View, open_display
 from shadowpuppet.live.display.web import PORT, WebDisplay
 from shadowpuppet.video import read_image
 

@@ -29,7 +29,7 @@ from shadowpuppet.cli import app as cli
 from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
 from shadowpuppet.geometry import inverse, transform
 from shadowpuppet.io.run import read_run
-from shadowpuppet.live.display.listener import LiveListener
+from shadowpuppet.live.display.view import LiveListener
 from shadowpuppet.live.play import play_run
 from shadowpuppet.live.stream import websocket
 from shadowpuppet.live.stream.avatar import Avatar

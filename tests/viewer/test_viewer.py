@@ -35,7 +35,6 @@ from shadowpuppet.motion.motion import STATUSES, JointTable
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.viewer.scene.colours import mesh_colours
 from shadowpuppet.viewer.scene.figures import animation_figure, joint_figure, pose_figure
 from shadowpuppet.viewer.scene.film_images import hull_function
 from shadowpuppet.viewer.scene.of_prior import body_of as body_of_prior
@@ -44,7 +43,7 @@ from shadowpuppet.viewer.scene.of_run import side_by_side
 from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
 from shadowpuppet.viewer.scene.scene import Figure, Scene, SceneCamera
 from shadowpuppet.viewer.scene.strip import doubtful_moments, nearest_frames, strips_of
-from shadowpuppet.viewer.web.content import motion_content, page_text
+from shadowpuppet.viewer.web.content import mesh_colours, motion_content, page_text
 from shadowpuppet.viewer.web.frustum_images import Undistorter, camera_image
 from shadowpuppet.viewer.web.page import kept_frames, write_page
 from shadowpuppet.viewer.web.serve import ScenePage, serving

@@ -28,7 +28,7 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     truth
         Joints to compare with: .csv, .trc, .c3d, .bvh, .amc, .npz or .parquet. [default: the recording's truth]
     joints
-        Joints to compare, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
+        Joints to compare, separated by commas; or upper, or limbs. [default: upper; limbs where there are legs]
     start
         First frame of the truth to compare: its number (120 or 120f), or its time (3.5s).
     end
@@ -154,8 +154,6 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str | list[str]]]:
         yield "world", world_text(measured["world"])
     if axes := measured["axes_mm"]:
         yield "axes", ", ".join(f"{x} {axes[x]['mean']:+.1f} (rmse {axes[x]['rmse']:.1f})" for x in "xyz") + " mm, run less truth"
-    if "mean_mm" in (human := measured["humaneva"]):
-        yield "HumanEva", f"{human['mean_mm']:.1f} mm (sd {human['sd_mm']:.1f}) over its 15 joints"
     if measured["bends_deg"]:
         yield "bends", ", ".join(f"{joint} {value['rmse']:.1f}" for joint, value in measured["bends_deg"].items()) + " degrees (rmse)"
     if moves := measured["acceleration"]:

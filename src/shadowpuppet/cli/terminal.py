@@ -17,7 +17,7 @@ from rich.text import Text
 from shadowpuppet.cli.look_tables import look_table
 from shadowpuppet.cli.tables import PlainConsole, show, verdict_table
 from shadowpuppet.errors import ShadowPuppetWarning, printable
-from shadowpuppet.live.display.listener import LiveListener
+from shadowpuppet.live.display.view import LiveListener
 from shadowpuppet.pipeline.look import Look, RigLook
 from shadowpuppet.pipeline.verdict.verdict import verdict_of_look
 

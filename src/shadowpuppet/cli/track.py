@@ -160,7 +160,7 @@ def live(camera: Annotated[str | None, Parameter(help="The camera, or a film to 
     from time import strftime
 
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.live.display.choice import open_display
+    from shadowpuppet.live.display.view import open_display
     from shadowpuppet.live.run import run_live
     from shadowpuppet.live.stream.choice import open_outlets
     from shadowpuppet.viewer.web.live import SpaceDisplay

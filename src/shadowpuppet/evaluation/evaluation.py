@@ -18,7 +18,6 @@ from shadowpuppet.evaluation.error_metrics import (
     axis_errors,
     bone_errors,
     hinge_errors,
-    humaneva_error,
     pose_losses,
     whole_alignment,
     world_difference,
@@ -152,8 +151,8 @@ def _error_metrics(run: Run, ours: JointTable, theirs: JointTable, errors: Joint
     """All of `error_metrics`, of tables at the same times."""
     sd = at_times(replace(run.motion.table, positions=run.motion.joint_sd), ours.times).select(errors.names).positions
     return {"aligned_mm": aligned_errors(errors, ours, theirs), "axes_mm": axis_errors(errors),
-            "humaneva": humaneva_error(ours, theirs), "bends_deg": hinge_errors(ours, theirs),
-            "acceleration": acceleration_errors(ours.select(errors.names), theirs), "bone_errors": bone_errors(ours, theirs),
+            "bends_deg": hinge_errors(ours, theirs), "acceleration": acceleration_errors(ours.select(errors.names), theirs),
+            "bone_errors": bone_errors(ours, theirs),
             "coverage": coverage(errors.delta, sd, errors.names), "exchanges": exchanges(ours, theirs)}
 
 

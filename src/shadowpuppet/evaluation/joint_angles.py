@@ -6,6 +6,7 @@ import numpy as np
 
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.evaluation.error_metrics import angle_errors
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable, Motion
@@ -59,9 +60,7 @@ def dof_errors(skeleton: Skeleton, ours: Array, theirs: Array) -> dict[str, dict
     found = {}
     for d, dof in enumerate(skeleton.dofs):
         if dof.kind == "rotation" and not dof.joint.endswith(UNOBSERVABLE):
-            off = np.degrees(wrapped(ours[:, d] - theirs[:, d]))
-            found[dof.name] = {"bias": float(off.mean()), "mean": float(np.abs(off).mean()), "rmse": float(np.sqrt((off**2).mean())),
-                               "aligned": float(off.std())}
+            found[dof.name] = angle_errors(np.degrees(wrapped(ours[:, d] - theirs[:, d])))
     return found
 
 

@@ -21,8 +21,7 @@ from shadowpuppet.io.motion.characters.usd import write_usda
 from shadowpuppet.io.motion.glb import write_glb
 from shadowpuppet.io.motion.npz import write_motion_npz, write_npz
 from shadowpuppet.io.motion.opensim.coordinates import MODELS, coordinates
-from shadowpuppet.io.motion.opensim.markers import marker_names
-from shadowpuppet.io.motion.opensim.model_writer import write_osim
+from shadowpuppet.io.motion.opensim.model_writer import marker_names, write_osim
 from shadowpuppet.io.motion.opensim.mot import write_mot
 from shadowpuppet.io.motion.parquet import write_parquet
 from shadowpuppet.io.motion.table import dof_unit, motion_columns, table_columns, write_columns, write_joints

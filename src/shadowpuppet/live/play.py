@@ -16,7 +16,7 @@ from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.live.display.listener import LiveListener
+from shadowpuppet.live.display.view import LiveListener
 from shadowpuppet.live.interrupt import Stop
 from shadowpuppet.live.stream.outlet import Outlets, Subject
 from shadowpuppet.motion.body_animation import base_in_world

@@ -17,8 +17,7 @@ from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import RunWriter, write_metrics
 from shadowpuppet.live.base_session import Given, LiveSession, Outcome
-from shadowpuppet.live.display.listener import LiveListener
-from shadowpuppet.live.display.view import Display
+from shadowpuppet.live.display.view import Display, LiveListener
 from shadowpuppet.live.interrupt import Stop
 from shadowpuppet.live.phases import in_background
 from shadowpuppet.live.recorder import Recorder

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.body.bones import BONES
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
@@ -20,8 +20,8 @@ UPPER_JOINTS = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "r
 """Joints compared for a run without legs."""
 LIMB_JOINTS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right"))
 """Joints compared for a run with legs."""
-GROUPS = {"upper": UPPER_JOINTS, "limbs": LIMB_JOINTS, "humaneva": ("pelvis", "neck", "head", *LIMB_JOINTS)}
-"""Named groups of joints; HumanEva's error is the mean distance over its 15 (Sigal, Balan and Black 2010)."""
+GROUPS = {"upper": UPPER_JOINTS, "limbs": LIMB_JOINTS}
+"""Named groups of joints."""
 LOST_ERROR, FAR_ERROR = 0.5, 0.3
 """Error (m) counted for a missing joint, so that leaving out bad frames never helps; and error (m) from which a joint counts as far
 off."""

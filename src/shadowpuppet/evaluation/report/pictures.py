@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.bones import BONES
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import BLACK, WHITE, colour_of, draw_bone, in_colour, write_text
 from shadowpuppet.errors import ShadowPuppetError

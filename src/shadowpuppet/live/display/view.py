@@ -1,4 +1,4 @@
-"""State of a live session after a picture, and the base class of displays."""
+"""What a live session shows and says: its state after a picture, the base class of displays, and the one that `--show` selects."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
+from shadowpuppet.errors import SettingsError, warn
+from shadowpuppet.pipeline.progress import Listener
+
 if TYPE_CHECKING:  # these import Numba
     from numpy.typing import NDArray
 
     from shadowpuppet.camera.rasterize import Picture
+    from shadowpuppet.live.display.web import WebDisplay
     from shadowpuppet.video import Image
 
 PHASES = ("learning", "waiting", "measuring", "tracking")
@@ -105,3 +109,43 @@ class Display:
 
 def _number(value: float | None, digits: int) -> float | None:
     return None if value is None or not np.isfinite(value) else round(float(value), digits)
+
+
+class LiveListener(Listener):
+    """Receives messages of a session. Every method does nothing: override those of interest."""
+
+    def note(self, message: str) -> None:
+        """A message for the person before the camera or at the terminal."""
+
+    def trouble(self, message: str) -> None:
+        """A problem: no usable pictures come, or the motion cannot be sent to other programs."""
+
+
+FOOTERS = {
+    False: "Pictures stay in this machine's memory; joints and angles alone are saved.",
+    True: "The pictures are recorded (--record).",
+}
+GONE = {
+    "window": "--show browser shows the same on a page, with the same keys",
+    "viewer": "--show browser shows the body in space too, beside the picture",
+}
+"""Displays that are gone, and what replaces them."""
+
+
+def open_display(show: str, listen: str = "127.0.0.1", port: int | None = None, record: bool = False,
+                 page: type[WebDisplay] | None = None) -> Display:
+    """The display for `auto`, `browser` or `none`; `auto` also opens the page in a browser if there is a screen.
+
+    `page`: the kind of page; None: the plain one. Raises `SettingsError` if it cannot be served.
+    """
+    if show == "none":
+        return Display()
+    if show in GONE:
+        raise SettingsError(f"show: found {show!r}, which is gone: {GONE[show]}")
+    from shadowpuppet.live.display.web import WebDisplay
+    from shadowpuppet.network import is_loopback
+
+    display = (page or WebDisplay)(listen, port, FOOTERS[record], opening=show == "auto")
+    if not is_loopback(listen):
+        warn(f"the page is served at {listen}: everybody who reaches this machine can see the person there, and press the buttons")
+    return display

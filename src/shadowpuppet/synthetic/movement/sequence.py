@@ -18,9 +18,9 @@ from shadowpuppet.synthetic.movement.gestures import (
     duration,
     gesture_postures,
     interpolate_keys,
+    involuntary_motion,
     key_postures,
 )
-from shadowpuppet.synthetic.movement.involuntary import involuntary_motion
 from shadowpuppet.synthetic.movement.resting import PostureName, resting_stance
 from shadowpuppet.synthetic.person.kinematics import CHANNELS, Figure, Stance, planted_stance, pose, pose_over, rotations
 from shadowpuppet.synthetic.person.mannequin import Mannequin

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.bones import BONES
 from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.body_animation import BodyTree

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.intervals import HALF_WIDTH
 from shadowpuppet.motion.motion import STATUSES
-from shadowpuppet.viewer.scene.colours import mesh_colours
 from shadowpuppet.viewer.scene.scene import Chart, Figure, Scene, SceneCamera
 from shadowpuppet.viewer.scene.strip import Strip, doubtful_moments, strips_of
 from shadowpuppet.viewer.web.frustum_images import Undistorter
@@ -143,3 +142,17 @@ def packed(values: ArrayLike, kind: str) -> dict[str, str]:
     if kind[0] in "iu" and array.dtype.kind == "f":
         array = np.nan_to_num(array).round()
     return {"type": kind, "data": base64.b64encode(np.ascontiguousarray(array, f"<{kind}").tobytes()).decode()}
+
+
+MIXED = {"estimate": ((0, 0, 0), 0.0), "truth": ((0, 0, 0), 0.0), "other": ((112, 64, 170), 0.35), "mean": ((150, 156, 164), 0.35)}
+"""Colour mixed into that of a kind of figure, and its share."""
+TINT = 0.5
+"""Share of a person's own tint."""
+
+
+def mesh_colours(figure: Figure) -> Array:
+    """Colours of the points of a figure's mesh, sRGB, 0..255, of shape (V, 3)."""
+    linear = np.clip(figure.mesh.colours, 0, 1)
+    own = 255 * np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    mixed, share = MIXED[figure.kind] if figure.tint is None else (figure.tint, TINT)
+    return np.asarray(((1 - share) * own + share * np.array(mixed)).round())

@@ -6,6 +6,7 @@ TRC file finds the same angles.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -18,9 +19,24 @@ from shadowpuppet.geometry import euler_angles
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.opensim.body_masses import Mass, average_weight, body_masses
 from shadowpuppet.io.motion.opensim.coordinates import MODELS, PELVIS_POSITION, SIDES, TO_MODEL, Ball, Hinge, Part
-from shadowpuppet.io.motion.opensim.markers import MARKERS
-from shadowpuppet.motion.animation import Animation
+from shadowpuppet.motion.animation import Y_UP, Animation
 from shadowpuppet.motion.body_animation import TO_REST
+from shadowpuppet.motion.motion import JointTable
+
+MARKERS = {
+    "pelvis": "Hip", "neck": "Neck", "head": "HeadBase", "crown": "Head", "nose": "Nose",
+    **{f"{side}_{joint}": f"{side[0].upper()}{name}" for side in ("left", "right") for joint, name in (
+        ("shoulder", "Shoulder"), ("elbow", "Elbow"), ("wrist", "Wrist"), ("hand", "Middle1"), ("hip", "Hip"), ("knee", "Knee"),
+        ("ankle", "Ankle"), ("heel", "Heel"), ("toe", "BigToe"))},
+}  # fmt: skip
+"""Marker names of our joints: those of HALPE_26, Pose2Sim's default. `Head` is the crown there, so the base of the skull has another name;
+hands have the name of Pose2Sim's COCO_133_WRIST."""
+
+
+def marker_names(table: JointTable) -> JointTable:
+    """The table with names of `MARKERS`, rotated so that Y is up, (x, z, -y); joints without such a name keep theirs."""
+    return replace(table, names=tuple(MARKERS.get(name, name) for name in table.names), positions=table.positions @ Y_UP.T)
+
 
 VERSION = "40000"
 """Of OpenSim's file format: read by OpenSim 4.0 and later."""
