@@ -6,10 +6,10 @@ import numpy as np
 
 from shadowpuppet.synthetic import Mannequin, Ring, Scene, Spec
 from shadowpuppet.synthetic.collection import PLAIN_LENS, VGA
-from shadowpuppet.synthetic.person.mannequin import Kind
+from shadowpuppet.synthetic.person.mannequin import PersonKind
 from shadowpuppet.synthetic.spec_changes import parse_gestures
 
-HUMANEVA: tuple[tuple[str, Kind, int, str, float, int, float, float, tuple[int, int]], ...] = (
+HUMANEVA: tuple[tuple[str, PersonKind, int, str, float, int, float, float, tuple[int, int]], ...] = (
     # name, kind and seed of the body, gestures, seconds of them before the film, its frames, distance (m) and field of view (degrees) of
     # the cameras, seeds of clothes and room
     ("humaneva_walking", "man", 21, "walk 11", 2.0, 433, 4.8, 48, (92, 92)),

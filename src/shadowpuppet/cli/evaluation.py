@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -56,7 +56,8 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     if movement is not None:
         check_output(movement, run, ".csv")
     if person_folders(run):
-        return _of_people(run, truth, file, report, movement, update, quiet, as_json)
+        of_one = {"TRUTH": truth, "--report": report, "--movement": movement, "--update": update}
+        return _of_people(run, file, [name for name, given in of_one.items() if given], quiet, as_json)
     written = {}
     with terminal(quiet or as_json) as listener:
         listener.begin("measuring")
@@ -79,17 +80,15 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
         show(*_tables(found.measured), pairs([*_rows(found.measured), *((name, str(path)) for name, path in written.items())]))
 
 
-def _of_people(run: Path, truth: Path | None, file: Path | None, report: Path | None, movement: Path | None, update: bool, quiet: bool,
-               as_json: bool) -> None:
-    """Evaluate a run of several people."""
+def _of_people(run: Path, file: Path | None, refused: Sequence[str], quiet: bool, as_json: bool) -> None:
+    """Evaluate a run of several people; `refused`: given flags that need the run of one person."""
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.errors import SettingsError
     from shadowpuppet.evaluation.evaluation import write_evaluation
     from shadowpuppet.evaluation.people import measure_people
 
-    if wrong := next((name for name, given in (("TRUTH", truth), ("--report", report), ("--movement", movement),
-                                                  ("--update", update)) if given), None):
-        raise SettingsError(f"{wrong}: found it for a run of several people, expected it for one of them, such as {run / 'person-1'}")
+    if refused:
+        raise SettingsError(f"{refused[0]}: found it for a run of several people, expected it for one of them, such as {run / 'person-1'}")
     with terminal(quiet or as_json) as listener:
         listener.begin("measuring")
         measured = measure_people(run)

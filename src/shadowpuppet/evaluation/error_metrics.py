@@ -105,7 +105,7 @@ def angle_errors(off: Array) -> dict[str, float]:
 
 
 def hinge_angles(run: JointTable, truth: JointTable) -> dict[str, Array]:
-    """How far elbows and knees are bent in run and truth, degrees, each (2, N), in the frames in which both are known."""
+    """Bends of elbows and knees in run and truth, degrees, each (2, N), in the frames in which both are known."""
     found = {}
     for name, chain in HINGES.items():
         if {*chain} <= {*run.names} & {*truth.names}:

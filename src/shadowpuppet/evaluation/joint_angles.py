@@ -65,8 +65,7 @@ def dof_errors(skeleton: Skeleton, ours: Array, theirs: Array) -> dict[str, dict
 
 
 def frame_aligned(ours: Array, theirs: Array) -> Array:
-    """Rotations (N, 3, 3) with one constant rotation before them and one behind them, those that bring them nearest to others (N, 3, 3):
-    each is found in turn."""
+    """Rotations (N, 3, 3) between two constant ones that bring them nearest to others (N, 3, 3); the two are found in turn."""
     above, below = np.eye(3), np.eye(3)
     for _ in range(ALIGNMENTS):
         below = _nearest_rotation((ours.swapaxes(1, 2) @ above.T @ theirs).sum(0))

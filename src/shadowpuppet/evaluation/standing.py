@@ -1,4 +1,4 @@
-"""How well the feet stand: slide and depth in contact, and contacts compared with a truth's."""
+"""Quality of standing feet: slide and depth in contact, and contacts compared with a truth's."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ def joint_errors(run: JointTable, truth: JointTable, joints: Sequence[str] | Non
 
 
 def default_joints(run: JointTable, truth: JointTable) -> tuple[str, ...]:
-    """`LIMB_JOINTS` for a run with legs, else `UPPER_JOINTS`; only those that both tables have."""
+    """`LIMB_JOINTS` for a run with legs, else `UPPER_JOINTS`; only joints that both tables have."""
     group = LIMB_JOINTS if any(name.endswith(("_hip", "_knee", "_ankle")) for name in run.names) else UPPER_JOINTS
     return tuple(name for name in group if name in run.names and name in truth.names)
 
@@ -125,7 +125,7 @@ def accelerations(table: JointTable) -> Array:
 
 def jitter(table: JointTable) -> float:
     """Root mean square acceleration of joints, m/s^2; not a number without three consecutive known frames. It includes the motion's own
-    acceleration and grows with the frame rate: compare it with the truth's, or with that of another run of the film."""
+    acceleration and grows with the frame rate: compare it with the truth's, or with another run's of the film."""
     squares = (accelerations(table) ** 2).sum(2)
     squares = squares[np.isfinite(squares)]
     return float(np.sqrt(squares.mean())) if squares.size else np.nan

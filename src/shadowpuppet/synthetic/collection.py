@@ -10,7 +10,7 @@ import numpy as np
 from shadowpuppet.synthetic.furniture import Obstacle
 from shadowpuppet.synthetic.movement.resting import PostureName
 from shadowpuppet.synthetic.movement.script import Gesture
-from shadowpuppet.synthetic.person.mannequin import Kind, Mannequin
+from shadowpuppet.synthetic.person.mannequin import Mannequin, PersonKind
 from shadowpuppet.synthetic.spec import Scene, Spec
 from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.synthetic.viewpoint import Ring, Viewpoint
@@ -30,7 +30,7 @@ def demo_ring_spec() -> Spec:
 
 
 PAPER = "wave_hands 3.6, bend_aside 3.6, bow_forward 2.8"
-PROVING: tuple[tuple[str, Kind, int, str, float, float, float, float, float], ...] = (
+PROVING: tuple[tuple[str, PersonKind, int, str, float, float, float, float, float], ...] = (
     # name, kind and seed of the body, gestures, distance (m), fov (degrees), pitch (degrees), noise (grey levels), turn (degrees)
     ("man_paper", "man", 1, PAPER, 2.0, 60, 0, 2.5, 0),
     ("woman_paper", "woman", 2, PAPER, 2.0, 60, 0, 2.5, 0),
@@ -58,7 +58,7 @@ def proving_ground(shift: int = 0) -> tuple[Spec, ...]:
 
     They are fixed; make the n-th with `numpy.random.default_rng([seed, n])`, its own seed being (0, n). Level cameras stand at 0.9 of the
     stature, so that the picture cuts the legs; pitched ones higher or lower, so that the person stays in the picture. With a `shift` they
-    have other people, clothes and rooms, to test on what was chosen; their seeds are (shift, n).
+    have other people, clothes and rooms, to test the choices; their seeds are (shift, n).
     """
     specs = []
     for n, (name, kind, seed, gestures, distance, fov, pitch, noise, turn) in enumerate(PROVING):
@@ -70,11 +70,11 @@ def proving_ground(shift: int = 0) -> tuple[Spec, ...]:
     return tuple(specs)
 
 
-def _person(kind: Kind, seed: int, bmi: float | None = None, age: float | None = None) -> Mannequin:
+def _person(kind: PersonKind, seed: int, bmi: float | None = None, age: float | None = None) -> Mannequin:
     return Mannequin.draw(np.random.default_rng(seed), kind, bmi=bmi, age=age)
 
 
-AROUND: tuple[tuple[str, Kind, int, str, float], ...] = (
+AROUND: tuple[tuple[str, PersonKind, int, str, float], ...] = (
     # name, kind and seed of the body, gestures, distance of the seven cameras (m)
     ("ring_upper", "woman", 4, "wave_hands 4, reach 5, random 6", 3.5),
     ("ring_walking", "man", 21, "walk 7", 4.8),
@@ -95,10 +95,9 @@ def around() -> tuple[Spec, ...]:
 
 
 VGA, WIDE_LENS, PLAIN_LENS = (640, 480), (-0.22, 0.06, 0.0, 0.0), (-0.09, 0.05, 0.0, 0.0)
-Row = tuple[str, Mannequin, str, str | None, Ring, dict[str, Any], float]
 
 
-def _rings() -> tuple[Row, ...]:
+def _rings() -> tuple[tuple[str, Mannequin, str, str | None, Ring, dict[str, Any], float], ...]:
     """One row per recording; a function, because checking a ring with a distorted lens loads OpenCV."""
     return (
         # name, body, gestures, those of the training (None: the same, "": none), cameras, scene, pictures a second
@@ -140,7 +139,7 @@ def proving_rings() -> tuple[Spec, ...]:
     )  # fmt: skip
 
 
-RESTING: tuple[tuple[str, Kind, int, PostureName, str, str, int], ...] = (
+RESTING: tuple[tuple[str, PersonKind, int, PostureName, str, str, int], ...] = (
     # name, kind and seed of the body, posture, gestures, chair (none, known: in the empty scene too, new: in the film only), cameras
     ("sits", "man", 61, "seated", "reach 4, wave_hands 3", "known", 1),
     ("sits_on_new", "man", 61, "seated", "reach 4, wave_hands 3", "new", 1),

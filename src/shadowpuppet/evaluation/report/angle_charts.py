@@ -68,7 +68,7 @@ def bland_altman(of: Evaluation) -> str:
 
 
 def gait_cycle(cycles: Sequence[Cycle], normal: Callable[[Cycle], Normal | None], stance: Mapping[str, float]) -> str:
-    """Every angle over the gait cycle, both sides in one panel, before the band of what is normal, one standard deviation to each side, and
+    """Every angle over the gait cycle, both sides in one panel, before the band of normal angles, one standard deviation to each side, and
     with `stance`, % of the cycle by side, dotted."""
     panels = list(dict.fromkeys(each.name for each in cycles))
     rows = -(-len(panels) // COLUMNS)

@@ -134,7 +134,7 @@ def definitions_section(of: Evaluation) -> str:
             ("Joint error", "Distance between a joint and its truth. The mean is over all frames and joints of the truth; where the run "
                             f"has no pose, each joint counts {1000 * LOST_ERROR:.0f} mm, so that leaving out bad frames never helps. "
                             "<span class=formula>rmse = √(mean of d²)</span>."),
-            ("Laid over each other", "Run and truth compared after less and less is asked of the run: one rigid motion of the whole; each "
+            ("Laid over each other", "Run and truth compared after ever freer alignments: one rigid motion of the whole; each "
                                      f"frame's mean offset; distances from the {root}; the best rigid motion of each frame (Procrustes); "
                                      "that with a scale, which papers call PA-MPJPE. The first alone says where the person was."),
             ("Acceleration", "Root mean square of second differences of the joints' places, of run and truth at the same times."),

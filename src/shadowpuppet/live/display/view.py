@@ -1,4 +1,4 @@
-"""What a live session shows and says: its state after a picture, the base class of displays, and the one that `--show` selects."""
+"""Output of a live session: its state after a picture, the base class of displays, the display of `--show`, and messages."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ COMMANDS = ("stop", "learn", "measure")
 """Commands to a session: end, learn the background again, find the person again."""
 
 
-class Angle(NamedTuple):
+class DofAngle(NamedTuple):
     """A joint angle and its limits, degrees."""
 
     name: str
@@ -34,7 +34,7 @@ class Angle(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class View:
+class SessionState:
     """State of a session after a picture."""
 
     phase: str
@@ -49,7 +49,7 @@ class View:
     """One of `motion.STATUSES` while tracking, else empty."""
     overlap: float = np.nan
     """Overlap of body and silhouette, 0..1."""
-    angles: tuple[Angle, ...] = ()
+    angles: tuple[DofAngle, ...] = ()
     latency: float = np.nan
     """Seconds from capture to pose; with a lag, to the smoothed one."""
     lag: float = 0.0
@@ -80,10 +80,10 @@ class View:
 
     def figures(self) -> dict[str, Any]:
         """Everything but the arrays, for JSON: milliseconds and degrees, None if unknown."""
-        return {"phase": self.phase, "chip": self.chip, "message": self.trouble or self.message, "countdown": _number(self.countdown, 1),
-                "overlap": _number(self.overlap, 3), "latency": _number(1000 * self.latency, 1), "lag": _number(1000 * self.lag, 0),
-                "interval": _number(1000 * self.interval, 1), "rate": _number(self.rate, 1), "dropped": self.dropped,
-                "angles": [[a.name, _number(a.value, 1), a.low, a.high] for a in self.angles]}
+        return {"phase": self.phase, "chip": self.chip, "message": self.trouble or self.message, "countdown": rounded(self.countdown, 1),
+                "overlap": rounded(self.overlap, 3), "latency": rounded(1000 * self.latency, 1), "lag": rounded(1000 * self.lag, 0),
+                "interval": rounded(1000 * self.interval, 1), "rate": rounded(self.rate, 1), "dropped": self.dropped,
+                "angles": [[a.name, rounded(a.value, 1), a.low, a.high] for a in self.angles]}
 
 
 class Display:
@@ -99,7 +99,7 @@ class Display:
     def __exit__(self, *_: object) -> None:
         """Close it."""
 
-    def show(self, view: View) -> None:
+    def show(self, view: SessionState) -> None:
         """Show a view; called at least ten times a second, changed or not."""
 
     def command(self) -> str:
@@ -107,7 +107,8 @@ class Display:
         return ""
 
 
-def _number(value: float | None, digits: int) -> float | None:
+def rounded(value: float | None, digits: int) -> float | None:
+    """A number for JSON; None if it is not known."""
     return None if value is None or not np.isfinite(value) else round(float(value), digits)
 
 

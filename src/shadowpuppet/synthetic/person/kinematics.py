@@ -42,7 +42,7 @@ HANGING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """The left upper arm's frame when it hangs, in the thorax' frame: its bone (x) points down."""
 
 
-class Figure(NamedTuple):
+class PosedBody(NamedTuple):
     """A mannequin in T postures."""
 
     joints: Array
@@ -55,7 +55,7 @@ class Figure(NamedTuple):
     """Curl of the left and right fingers, of shape (T, 2), 0 to 1."""
 
 
-class Stance(NamedTuple):
+class LegPlacement(NamedTuple):
     """Pelvis and feet in T postures; the legs follow by two-bone inverse kinematics."""
 
     pelvis: Array
@@ -77,7 +77,7 @@ def rotations(*vector: Array) -> Array:
     return Rotation.from_rotvec(np.stack(np.broadcast_arrays(*vector), -1)).as_matrix()
 
 
-def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> Figure:
+def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> PosedBody:
     """The figure of `body` in `postures` (T, `CHANNELS`), its feet planted about the world's origin.
 
     stance: half the distance between the ankles over the leg's length. The feet stay in place: the pelvis sinks as far as both legs
@@ -86,8 +86,8 @@ def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> Figure:
     return pose_over(body, postures, planted_stance(body, postures, stance))
 
 
-def planted_stance(body: Mannequin, postures: Array, stance: float = 0.13) -> Stance:
-    """The `Stance` of `pose`: feet side by side about the origin, the pelvis as high as the legs allow."""
+def planted_stance(body: Mannequin, postures: Array, stance: float = 0.13) -> LegPlacement:
+    """The `LegPlacement` of `pose`: feet side by side about the origin, the pelvis as high as the legs allow."""
     q = dict(zip(CHANNELS, np.asarray(postures, float).T))
     yaw = _yaw(q)
     half, height = stance * (body.length("thigh") + body.length("shank")), body.rest()["left_ankle"][2]
@@ -95,10 +95,10 @@ def planted_stance(body: Mannequin, postures: Array, stance: float = 0.13) -> St
     ankles = np.stack([yaw @ np.array([sign * half, 0, height]) for sign in (1, -1)], 1)
     feet = np.stack([yaw @ rotations(*np.zeros((2, 1)), np.array([out])) for out in (TOE_OUT, -TOE_OUT)], 1)
     ahead = np.repeat((yaw @ np.array([0.0, -1.0, 0.0]))[:, None], 2, 1)
-    return Stance(sway + np.array([0, 0, np.inf]), ankles, feet, np.zeros((len(yaw), 2)), ahead)
+    return LegPlacement(sway + np.array([0, 0, np.inf]), ankles, feet, np.zeros((len(yaw), 2)), ahead)
 
 
-def pose_over(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) -> Figure:
+def pose_over(body: Mannequin, postures: Array, stance: LegPlacement, soft: float = 0.0) -> PosedBody:
     """The figure of `body` in `postures` (T, `CHANNELS`); `stance` gives pelvis and feet, in place of the postures' `sway`.
 
     soft: metres below its limit from which on the pelvis is held down smoothly; 0 for a hard limit.
@@ -147,10 +147,10 @@ class Assembly:
         self.frame |= {f"{side}_clavicle": (clavicle, sternum), f"{side}_upper_arm": (upper, shoulder), f"{side}_forearm": (forearm, elbow),
                        f"{side}_hand": (hand, wrist), f"{side}_fingers": _fingers(hand, wrist, base, curl)}
 
-    def figure(self, curl: Array) -> Figure:
+    def figure(self, curl: Array) -> PosedBody:
         """The figure with the fingers bent by `curl` (T, 2)."""
         rotation, origin = zip(*(self.frame[name] for name in SEGMENTS))
-        return Figure(np.stack([self.joint[name] for name in JOINTS], 1), np.stack(rotation, 1), np.stack(origin, 1), curl)
+        return PosedBody(np.stack([self.joint[name] for name in JOINTS], 1), np.stack(rotation, 1), np.stack(origin, 1), curl)
 
 
 def _yaw(q: dict[str, Array]) -> Array:
@@ -188,7 +188,7 @@ def _fingers(hand: Array, wrist: Array, base: Array, curl: Array) -> tuple[Array
     return hand @ rotations(0 * bend, bend, 0 * bend), wrist + hand @ (KNUCKLES / HAND_POINT * base)
 
 
-def _add_legs(parts: Assembly, body: Mannequin, pelvis: Array, stance: Stance, soft: float) -> Array:
+def _add_legs(parts: Assembly, body: Mannequin, pelvis: Array, stance: LegPlacement, soft: float) -> Array:
     """Add the legs; returns the centre of the pelvis (T, 3), no higher than both legs reach."""
     thigh, shank, rest = body.length("thigh"), body.length("shank"), parts.rest
     hips = [pelvis @ (rest[f"{side}_hip"] - rest["pelvis"]) for side in SIDES]
