@@ -151,8 +151,8 @@ def test_the_version_is_reported_by_the_module_too():
     (["track", "here", "--tracker.motion-weight", "inf"], "tracker: motion_weight: found inf; input should be a finite number"),
     (["track", "here", "--config", "none.toml"], "none.toml: cannot be read (no such file"),
     (["track", "here"], "here: no such recording, expected a folder with video/ and calibration.toml, or a film"),
-    (["evaluate", "here"], "here: no such folder, expected that of a run, as `shadowpuppet track` writes it"),
-    (["export", "here"], "here: no such folder, expected that of a run"),
+    (["evaluate", "here"], "here: no such folder, expected a run's, as `shadowpuppet track` writes it"),
+    (["export", "here"], "here: no such folder, expected a run's"),
     (["settings", "--preset", "liu"], "unknown preset 'liu'"),
 ])  # fmt: skip
 def test_what_cannot_be_meant_is_said_in_a_line(shell, tokens, said):

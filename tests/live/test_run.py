@@ -30,8 +30,7 @@ from shadowpuppet.errors import ShadowPuppetWarning, VideoError
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.live import run as live_run
-from shadowpuppet.live.display.listener import LiveListener
-from shadowpuppet.live.display.view import Display
+from shadowpuppet.live.display.view import Display, LiveListener
 from shadowpuppet.live.run import run_live
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.sources import lens

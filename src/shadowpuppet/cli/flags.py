@@ -50,7 +50,7 @@ Config = Annotated[Path | None, flag("Settings file, TOML, as `shadowpuppet sett
 Quiet = Annotated[bool, switch("Show only warnings and errors.", OTHER)]
 Verbose = Annotated[bool, switch("Show all that was found, and all warnings.", OTHER)]
 AsJson = Annotated[bool, switch("Print JSON.", OTHER, "--json")]
-Recording = Annotated[Path, Parameter(help="Folder with video/, calibration.toml, ...; a project of Pose2Sim, FreeMoCap or OpenCap; "
+RecordingPath = Annotated[Path, Parameter(help="Folder with video/, calibration.toml, ...; a project of Pose2Sim, FreeMoCap or OpenCap; "
                                            "or a film or folder of pictures (then with --fov).")]
 
 

@@ -77,7 +77,7 @@ def read_run(folder: str | Path) -> Run:
     """Read a run folder, also a killed run's. Raises `FormatError`, naming file, line and column, if something is malformed."""
     folder = Path(folder)
     if not folder.exists():
-        raise FormatError(f"{folder}: no such folder, expected that of a run, as `shadowpuppet track` writes it")
+        raise FormatError(f"{folder}: no such folder, expected a run's, as `shadowpuppet track` writes it")
     if not (folder / "run.toml").exists():
         film = any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml"))
         hint = f"; it is a recording: track it first (`{typed('track', folder)}`)" if film else ""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import platform
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -16,7 +15,7 @@ from shadowpuppet.io import checkpoint
 from shadowpuppet.io.angle_conventions import write_angles
 from shadowpuppet.io.contacts import write_contacts
 from shadowpuppet.io.files.lock import LOCK, Lock, locked
-from shadowpuppet.io.files.plain import for_json, for_toml, plain
+from shadowpuppet.io.files.plain import for_toml, json_text, plain
 from shadowpuppet.io.files.table import csv_line
 from shadowpuppet.io.files.text import read_toml, write_whole
 from shadowpuppet.io.inputs.earlier_run import check_folder, unmark
@@ -45,7 +44,7 @@ class CompleteRun(ShadowPuppetError):
 class RunWriter:
     """Writes a run: `with RunWriter(...) as run: run.write(frame)`; `run.metrics` may be filled until the end.
 
-    The folder must be new, empty or that of an earlier run, which is replaced by `begin`, at the latest when the first frame is written.
+    The folder must be new, empty or an earlier run's, which is replaced by `begin`, at the latest when the first frame is written.
     Raises `ShadowPuppetError` for any other folder, for one in which another run is being written, and if it cannot be written; frames
     written before stay readable. It also does so, and the run is not complete, if the folder or its lock is taken away while the run goes
     on, or if one of its inputs changes.
@@ -54,8 +53,8 @@ class RunWriter:
     def __init__(self, folder: str | Path, body_name: str, dof_names: Sequence[str], joint_names: Sequence[str],
                  info: Mapping[str, Any], resume: Resuming | None = None, of_group: bool = False) -> None:
         """`info`: entries of run.toml; dataclasses, arrays and paths are converted, values of None are left out. `resume`: whether an
-        earlier run of the same `info` and inputs goes on from its checkpoint; None: no checkpoints are kept. `of_group`: whether it is that
-        of one of several people, who have one checkpoint together."""
+        earlier run of the same `info` and inputs goes on from its checkpoint; None: no checkpoints are kept. `of_group`: whether it
+        is the run of one of several people, with one checkpoint for all."""
         taken = set(info) & set(OWN_KEYS)
         if taken:
             raise ShadowPuppetError(f"info: found {min(taken)!r}, which the run's writer fills in itself")
@@ -90,7 +89,7 @@ class RunWriter:
 
     @property
     def _goes_on(self) -> Resuming | None:
-        """How an earlier run in the folder goes on; None if the run begins at the start."""
+        """The resumption of an earlier run in the folder; None if the run begins at the start."""
         return self._resume if self._resume is not None and self._resume.goes_on and self._earlier else None
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -145,7 +144,7 @@ class RunWriter:
                 (self.folder / "run.toml").unlink()
 
     def hand_over(self, types: Iterable[type] = ()) -> Any:
-        """Make the folder that of several people: only run.toml is written in it, with `people`; their runs go into folders of their own
+        """Make the folder one of several people: only run.toml is written in it, with `people`; their runs go into folders of their own
         (`io.people`). Returns the state of the last `checkpoint` of an earlier run that goes on; else that is removed, and there is none.
         `types`: as in `resumed`."""
         found = checkpoint.read_checkpoint(self.folder, types) if self._goes_on else None
@@ -333,8 +332,7 @@ def _append(tables: Sequence[BinaryIO], rows: tuple[list[str], list[str]], inter
 
 def write_metrics(folder: str | Path, metrics: Mapping[str, Any]) -> None:
     """Write metrics.json; NaN becomes null. Raises `ShadowPuppetError` if that fails."""
-    text = json.dumps(for_json(plain(metrics, "metrics")), indent=1, ensure_ascii=False, allow_nan=False)
-    write_whole(Path(folder) / "metrics.json", text + "\n")
+    write_whole(Path(folder) / "metrics.json", json_text(metrics, "metrics") + "\n")
 
 
 def versions() -> dict[str, str]:

@@ -16,19 +16,18 @@ from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import RunWriter, write_metrics
-from shadowpuppet.live.base_session import Given, LiveSession, Outcome
-from shadowpuppet.live.display.listener import LiveListener
-from shadowpuppet.live.display.view import Display
+from shadowpuppet.live.base_session import Given, LiveSession, StepResult
+from shadowpuppet.live.display.view import Display, LiveListener
 from shadowpuppet.live.interrupt import Stop
 from shadowpuppet.live.phases import in_background
 from shadowpuppet.live.recorder import Recorder
 from shadowpuppet.live.rig_capture import RigCapture
 from shadowpuppet.live.rig_session import RigSession
 from shadowpuppet.live.rig_sources import is_rig, open_rig_sources
-from shadowpuppet.live.session import Session
+from shadowpuppet.live.session import CameraSession
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.sources import empty_scene, known_person, lens
-from shadowpuppet.live.stream.outlet import Outlets, Subject
+from shadowpuppet.live.stream.outlet import Outlets, StreamSubject
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.live.warm_up import warm_up
 from shadowpuppet.live.watchdog import CameraWatchdog
@@ -38,7 +37,7 @@ from shadowpuppet.pipeline.subject import FittedPerson, average_body, joint_name
 from shadowpuppet.pipeline.track import smooth_run
 from shadowpuppet.settings import validate
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.video.capture import Capture
+from shadowpuppet.video.capture import CameraCapture
 from shadowpuppet.video.live_source import corrected, open_feed
 from shadowpuppet.video.network_stream import without_secrets
 
@@ -97,19 +96,19 @@ class _Live:
         self.subjects = list[tuple[int, FittedPerson]]()
         """Measured persons, each with its first frame."""
 
-    def _single(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
+    def _single(self) -> tuple[LiveSession, CameraCapture | RigCapture, float, bool]:
         """The session of one camera, its reader, its frames/s, and whether it is live (not a film)."""
         options, settings = self.options, self.settings
         person = known_person(options)
         feed = open_feed(settings.camera, rate=settings.rate, speed=settings.speed, start=options.start, end=options.end)
         (feed,) = corrected([feed], settings.delay)
         full = lens(options, feed.size)
-        session = Session(options, settings, np.random.default_rng(options.seed), self.clock, Timing(feed.rate), in_background,
+        session = CameraSession(options, settings, np.random.default_rng(options.seed), self.clock, Timing(feed.rate), in_background,
                           full=full, watchdog=CameraWatchdog(feed.name, feed.size, feed.live), person=person,
                           scene=empty_scene(options, full))
-        return session, Capture(feed), feed.rate, feed.live
+        return session, CameraCapture(feed), feed.rate, feed.live
 
-    def _several(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
+    def _several(self) -> tuple[LiveSession, CameraCapture | RigCapture, float, bool]:
         """The session of several cameras, their reader, their frame sets/s, and whether they are live (not films)."""
         sources = open_rig_sources(self.options, self.settings)
         watchdogs = tuple(CameraWatchdog(camera.name, size, sources.live) for camera, size in zip(sources.cameras, sources.sizes))
@@ -180,7 +179,7 @@ class _Live:
         for frame, age in given:
             self.outlets.follow(frame, age)
 
-    def _keep(self, outcome: Outcome) -> None:
+    def _keep(self, outcome: StepResult) -> None:
         for camera in self.session.asks_again(self.clock()):
             self.capture.again(camera)
         if outcome.frame is None:
@@ -202,10 +201,10 @@ class _Live:
         assert self.session.subject is not None
         return self.session.subject
 
-    def _stream_subject(self) -> Subject:
+    def _stream_subject(self) -> StreamSubject:
         """The measured person, for the outlets."""
         base, floor = self.session.placed()
-        return Subject(self._person.body, base, self._person.person.height, floor)
+        return StreamSubject(self._person.body, base, self._person.person.height, floor)
 
     def _write_beside(self) -> None:
         """Write person.toml and calibration.toml; called again whenever the person was measured again."""
@@ -213,7 +212,7 @@ class _Live:
         write_person(self.run_.folder / "person.toml", self._person.person)
         write_calibration(self.run_.folder / "calibration.toml", self.session.cameras)
 
-    def _tell(self, outcome: Outcome) -> None:
+    def _tell(self, outcome: StepResult) -> None:
         """Report changes to the listener, each once."""
         view, now = outcome.view, self.clock()
         if said := self.outlets.trouble():

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.camera.colour_codes import Codes, thinned
+from shadowpuppet.camera.colour_codes import ColourCode, thinned
 from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options, plain_options
@@ -95,7 +95,7 @@ def _unpacked(packed: Packed | None) -> Mask | None:
     return np.unpackbits(np.frombuffer(zlib.decompress(bits), np.uint8), count=int(np.prod(shape))).reshape(shape).view(np.bool_)
 
 
-def _codes(mask: Mask | None, packed: bytes | None) -> Codes | None:
+def _codes(mask: Mask | None, packed: bytes | None) -> ColourCode | None:
     """Colours in a mask (H, W), and 0 elsewhere."""
     if mask is None or packed is None:
         return None

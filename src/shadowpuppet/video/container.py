@@ -26,7 +26,7 @@ CONTAINERS = ("mov", "matroska", "avi", "mpegts", "mpeg", "mpegvideo", "ogg", "f
 lists, scripts, descriptions of sessions), or are no film."""
 LISTS = {b"#EXTM3U": "a play list (HLS)", b"ffconcat": "a list of films (ffconcat)", b"v=0": "the description of a session (SDP)",
          b"<?xml": "an XML file", b"<MPD": "a play list (DASH)"}
-"""What a file is that begins with some bytes, for messages."""
+"""Kind of a file by its first bytes, for messages."""
 DOORS = {"protocol_whitelist": "file", "format_whitelist": ",".join(CONTAINERS), "enable_drefs": "0", "use_absolute_path": "0"}
 """Options of FFmpeg, which compares the kind of a file with the list before anything else is opened: .mov files that refer to data in other
 files do not open them."""

@@ -104,7 +104,7 @@ def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float 
                 given += 1
                 yield frame
             return
-    again = iter(answers)  # each frame is asked for once
+    again = iter(answers)  # each frame is requested once
     yield from islice(_shown(path, film, step, grey, rate, lambda time: wanted(time) if (known := next(again, None)) is None else known,
                              _one_by_one), given, None)
 
@@ -118,7 +118,7 @@ def _shown(path: Path, film: FrameSource, step: float, grey: bool, rate: float |
     clock, convert, n, longest, broken = _Clock(path, step, quiet=rate is not None), converter(grey), 0, 0.0, ""
 
     def time_shown() -> float:
-        """Time (s) of the frame asked for last."""
+        """Time (s) of the last requested frame."""
         return (n - 1) / rate if rate else clock.last
 
     def asked(frame: Stamped) -> bool:
