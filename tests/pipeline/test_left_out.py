@@ -7,10 +7,10 @@ import pytest
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.pipeline.findings.film import survey_film
 from shadowpuppet.pipeline.footage import open_footage
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import add_left_out, left_out_metrics, warn_of_left_out
-from shadowpuppet.pipeline.survey.film import survey_film
 from shadowpuppet.silhouette.added import BesideBody, SceneHint
 from shadowpuppet.synthetic import Obstacle, Scene, Spec, Viewpoint, synthesize
 from shadowpuppet.video import open_frames

@@ -13,16 +13,16 @@ from hypothesis import strategies as st
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import HARMFUL, NOTED, RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
 from shadowpuppet.io.recording import Subject
+from shadowpuppet.pipeline.findings.camera import _doubts as camera_doubts
+from shadowpuppet.pipeline.findings.camera import _look
+from shadowpuppet.pipeline.findings.cautions import recovery_cautions
+from shadowpuppet.pipeline.findings.film import quality_of, survey_film
 from shadowpuppet.pipeline.footage import FIRST, FIRST_SECONDS, LOOKED_AT, RUN, RUNS, _spread, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import DEEP, _doubts, _forearms_seen, wrong_posture
 from shadowpuppet.pipeline.prepare import MONOCULAR, Prepared, look_at, prepare
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes, read_masks
-from shadowpuppet.pipeline.survey.camera import _doubts as camera_doubts
-from shadowpuppet.pipeline.survey.camera import _look
-from shadowpuppet.pipeline.survey.cautions import recovery_cautions
-from shadowpuppet.pipeline.survey.film import quality_of, survey_film
 from shadowpuppet.pipeline.track import json_text, track_recording
 from shadowpuppet.silhouette import RecoveredScene
 from shadowpuppet.silhouette.quality import mask_quality

@@ -20,15 +20,15 @@ from shadowpuppet.cli.app import run
 from shadowpuppet.errors import HARMFUL, NOTED, TrackingError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.pipeline.findings.look import FirstSeconds, RigLook
+from shadowpuppet.pipeline.findings.opening import opening_of
+from shadowpuppet.pipeline.findings.rig import _agreement_of_one, _rig_doubts, survey_rig
 from shadowpuppet.pipeline.footage import RUN, RUN_OF_SEVERAL, RUNS, RUNS_OF_SEVERAL, take_sample
-from shadowpuppet.pipeline.look import FirstSeconds, RigLook
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.prepare import MULTIVIEW, look_at, prepare
 from shadowpuppet.pipeline.progress import Listener, Steps, json_text
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
-from shadowpuppet.pipeline.survey.opening import opening_of
-from shadowpuppet.pipeline.survey.rig import _agreement_of_one, _rig_doubts, survey_rig
 from shadowpuppet.pipeline.track import track_recording
 
 MASKS = Options(masks=True)

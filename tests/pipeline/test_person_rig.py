@@ -21,10 +21,10 @@ from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline import person_rig
+from shadowpuppet.pipeline.findings.rig import survey_rig
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
-from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.tracking.multiview.settings import for_smeared
 from shadowpuppet.tracking.multiview.size_estimation import Front

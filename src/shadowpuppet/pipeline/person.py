@@ -23,8 +23,8 @@ from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
 from shadowpuppet.motion.limbs import status_in_words
 from shadowpuppet.motion.motion import Motion, MotionFrame
+from shadowpuppet.pipeline.findings.look import Look, Survey
 from shadowpuppet.pipeline.footage import CameraFrame, Footage
-from shadowpuppet.pipeline.look import Look, Survey
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import FALLBACK_RATE
 from shadowpuppet.pipeline.rig import FrameSet

@@ -22,8 +22,8 @@ from shadowpuppet.errors import HARMFUL, NOTED, Caution, SettingsError, choices
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.motion.motion import BLANK, JointTable, MotionFrame
+from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.learn_prior import familiar
-from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.rig import FrameSet

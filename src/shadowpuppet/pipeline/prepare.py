@@ -11,7 +11,9 @@ import numpy as np
 
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.io.person import write_person
-from shadowpuppet.pipeline.look import Look, RigLook, Survey
+from shadowpuppet.pipeline.findings.camera import survey_camera
+from shadowpuppet.pipeline.findings.look import Look, RigLook, Survey
+from shadowpuppet.pipeline.findings.rig import survey_rig
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.person import fit_monocular
 from shadowpuppet.pipeline.person_rig import fit_multiview
@@ -19,8 +21,6 @@ from shadowpuppet.pipeline.progress import STAGES, Listener, generators
 from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.subject import Before, FittedPerson, Observation, State, TrackedSubject
-from shadowpuppet.pipeline.survey.camera import survey_camera
-from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
 

@@ -23,7 +23,7 @@ from shadowpuppet.io.motion.motion_files import check_unit, read_truth
 from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.motion.motion import Motion
-from shadowpuppet.pipeline.look import Look, RigLook
+from shadowpuppet.pipeline.findings.look import Look, RigLook
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.tracking.frozen import Interval

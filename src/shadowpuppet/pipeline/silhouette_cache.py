@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.colour_codes import Codes, thinned
 from shadowpuppet.camera.mask import Mask, Seen
-from shadowpuppet.pipeline.look import Survey
+from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.rig import FrameSet, Rig
 

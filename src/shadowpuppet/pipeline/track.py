@@ -20,8 +20,9 @@ from shadowpuppet.io.prior import read_prior
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter
 from shadowpuppet.motion.motion import BLANK, Motion, MotionBuilder, MotionFrame
+from shadowpuppet.pipeline.findings.look import Survey
+from shadowpuppet.pipeline.findings.verdict import verdict_of_run
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
-from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options, check_used, plain_options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
 from shadowpuppet.pipeline.prepare import MONOCULAR, MULTIVIEW, Kind, Prepared, fit_survey, look_around
@@ -60,7 +61,6 @@ from shadowpuppet.pipeline.subject import (
     joint_names,
     motion_frame,
 )
-from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 from shadowpuppet.tracking.smoothing.butterworth import check_cutoff

@@ -16,12 +16,12 @@ from shadowpuppet.calibration.rotation_error import RotationError, estimate_plac
 from shadowpuppet.calibration.silhouettes import Row, silhouettes_of
 from shadowpuppet.calibration.time_offset import TimeOffsets, time_offsets
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
+from shadowpuppet.pipeline.findings.film import brief_length
 from shadowpuppet.pipeline.footage import Footage, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, uncluttered_silhouettes
-from shadowpuppet.pipeline.survey.film import brief_length
 from shadowpuppet.threads import usable_cores
 
 SETS, MIN_SETS, MAX_SETS_READ = 240, 120, 3000

@@ -1,10 +1,13 @@
-"""The verdict on a finished run, from what it states of itself: frames lost, width of the intervals, doubtful limbs."""
+"""One word on a recording or a run (good, doubtful, bad) and at most three reasons, the weightiest first.
+
+A run is judged by what it states of itself: frames lost, width of the intervals, doubtful limbs.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +16,11 @@ from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
 from shadowpuppet.motion.limbs import DOUBTFUL, joints_of_limbs, limbs_in_words
 from shadowpuppet.motion.metrics import LOST_ERROR
 from shadowpuppet.motion.motion import Motion
-from shadowpuppet.pipeline.look import Look, RigLook
-from shadowpuppet.pipeline.verdict.verdict import Verdict, verdict_of
+from shadowpuppet.pipeline.findings.look import Look, RigLook
 
+MOST = 3
+"""Greatest number of reasons."""
+Word = Literal["good", "doubtful", "bad"]
 MOSTLY_LOST = 0.5
 """Share of the frames with a person above which a run that loses them is a failure, with an exit code of its own."""
 OFTEN_LOST, OFTEN_DOUBTFUL = 0.05, {1: 0.6, 2: 0.4}
@@ -31,6 +36,31 @@ ROUNDED = 1e-3
 """Rounding (s) of the times in `set_aside`."""
 MEAN_DISTANCE = 2 * np.sqrt(2 / np.pi) / np.sqrt(3)
 """Mean length of a vector of three independent normal errors, over the root of the sum of their variances."""
+
+
+class Verdict(NamedTuple):
+    """A verdict and its reasons."""
+
+    word: Word
+    reasons: tuple[str, ...]
+    """At most three, the weightiest first, each with what to do in at most ten words."""
+
+    def plain(self) -> dict[str, Any]:
+        """The verdict for JSON."""
+        return {"word": self.word, "reasons": list(self.reasons)}
+
+
+def verdict_of(cautions: Iterable[Caution]) -> Verdict:
+    """The verdict that cautions lead to: bad with a ruinous one, doubtful with a harmful one, else good; equal weights keep their order."""
+    ordered = sorted(cautions, key=lambda caution: -caution.weight)
+    heaviest = ordered[0].weight if ordered else 0
+    word: Word = "bad" if heaviest >= RUINOUS else "doubtful" if heaviest >= HARMFUL else "good"
+    return Verdict(word, tuple(dict.fromkeys(caution.short for caution in ordered))[:MOST])
+
+
+def verdict_of_look(look: Look | RigLook) -> Verdict:
+    """The verdict on a recording before it is tracked: bad if tracking is hopeless."""
+    return Verdict("bad", (look.refusal,)) if look.refusal is not None else verdict_of(look.doubts)
 
 
 def verdict_of_run(look: Look | RigLook, motion: Motion, aside: Sequence[Mapping[str, Any]] = (),

@@ -12,9 +12,16 @@ from shadowpuppet.calibration.agreement import Agreement
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
 from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
-from shadowpuppet.pipeline.look import Look, RigLook
-from shadowpuppet.pipeline.verdict.of_run import _together, blind_frames, expected_error, lost_share, verdict_of_run
-from shadowpuppet.pipeline.verdict.verdict import verdict_of, verdict_of_look
+from shadowpuppet.pipeline.findings.look import Look, RigLook
+from shadowpuppet.pipeline.findings.verdict import (
+    _together,
+    blind_frames,
+    expected_error,
+    lost_share,
+    verdict_of,
+    verdict_of_look,
+    verdict_of_run,
+)
 from shadowpuppet.silhouette.correction.condition import FilmCondition
 from shadowpuppet.silhouette.quality import MaskQuality
 

@@ -12,14 +12,7 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import WHOLE
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.errors import HARMFUL, NOTED, Caution
-from shadowpuppet.pipeline.footage import FIRST, CameraFrame, Footage, Sample
-from shadowpuppet.pipeline.look import FirstSeconds, Look, Survey
-from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.people.census import count_in_picture
-from shadowpuppet.pipeline.progress import Listener, Steps
-from shadowpuppet.pipeline.rig import Rig
-from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes
-from shadowpuppet.pipeline.survey.cautions import (
+from shadowpuppet.pipeline.findings.cautions import (
     GOOD,
     clutter_cautions,
     condition_cautions,
@@ -30,7 +23,14 @@ from shadowpuppet.pipeline.survey.cautions import (
     sitting_cautions,
     unlike_ready,
 )
-from shadowpuppet.pipeline.survey.film import FilmSurvey, mean_overlap, survey_film
+from shadowpuppet.pipeline.findings.film import FilmSurvey, mean_overlap, survey_film
+from shadowpuppet.pipeline.findings.look import FirstSeconds, Look, Survey
+from shadowpuppet.pipeline.footage import FIRST, CameraFrame, Footage, Sample
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.people.census import count_in_picture
+from shadowpuppet.pipeline.progress import Listener, Steps
+from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes
 from shadowpuppet.silhouette.added import SceneHint
 
 SHORT = 1.0

@@ -12,13 +12,7 @@ from shadowpuppet.calibration.agreement import SETS_COMPARED, Agreement, agreeme
 from shadowpuppet.camera.mask import Seen, may_be_person
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
 from shadowpuppet.geometry import Array, evenly_spread
-from shadowpuppet.pipeline.footage import Footage
-from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, RigLook, Survey
-from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.people.census import Census, later_sets, sampled_sets, take_census
-from shadowpuppet.pipeline.progress import Listener, Steps
-from shadowpuppet.pipeline.rig import Rig
-from shadowpuppet.pipeline.survey.cautions import (
+from shadowpuppet.pipeline.findings.cautions import (
     GOOD,
     clutter_cautions,
     condition_cautions,
@@ -27,8 +21,14 @@ from shadowpuppet.pipeline.survey.cautions import (
     recovery_cautions,
     unlike_ready,
 )
-from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, of_several, survey_film
-from shadowpuppet.pipeline.survey.opening import OPENING, first_seconds, opening_of
+from shadowpuppet.pipeline.findings.film import FilmSurvey, brief_length, of_several, survey_film
+from shadowpuppet.pipeline.findings.look import CameraLook, FirstSeconds, RigLook, Survey
+from shadowpuppet.pipeline.findings.opening import OPENING, first_seconds, opening_of
+from shadowpuppet.pipeline.footage import Footage
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.people.census import Census, later_sets, sampled_sets, take_census
+from shadowpuppet.pipeline.progress import Listener, Steps
+from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_opencv_thread, usable_cores
 from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
