@@ -7,11 +7,11 @@ import pytest
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetWarning
-from shadowpuppet.pipeline.findings.film import survey_film
+from shadowpuppet.pipeline.findings.film import look_again, survey_film
 from shadowpuppet.pipeline.footage import open_footage
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.progress import add_left_out, left_out_metrics, warn_of_left_out
-from shadowpuppet.silhouette.added import BesideBody, SceneHint
+from shadowpuppet.pipeline.progress import Steps, add_left_out, left_out_metrics, warn_of_left_out
+from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.synthetic import Obstacle, Scene, Spec, Viewpoint, synthesize
 from shadowpuppet.video import open_frames
 
@@ -58,11 +58,12 @@ def test_what_the_body_leaves_unexplained_and_never_moves_belongs_to_the_scene(b
     person = (exact if exact.ndim == 2 else exact[..., 0]) > 0.5
     thing = (np.mean(first.masks, axis=0) > 0.9) & ~(exact if exact.ndim == 2 else exact[..., 0]).astype(bool)
     assert thing.any()
-    again = survey_film(footage, options, hint=SceneHint(BesideBody(thing, person)))
+    again = look_again(footage, first, options, BesideBody(thing, person), Steps(None, ["cam"]))
     assert again.silhouettes.added is not None
     assert again.silhouettes.before is not None
     assert np.mean([mask[thing].mean() for mask in again.masks]) < 0.1
     assert np.mean([mask[person].mean() for mask in again.masks]) > 0.9
-    assert any("never moves" in said for said in again.values["left_out"])
-    kept = survey_film(footage, options, hint=SceneHint(None, again.silhouettes.added))
+    assert any("never moves" in said for said in again.look.left_out)
+    assert look_again(footage, again, options, None, Steps(None, ["cam"])) is again
+    kept = survey_film(footage, options, added=again.silhouettes.added)
     assert all((one == other).all() for one, other in zip(kept.masks, again.masks))

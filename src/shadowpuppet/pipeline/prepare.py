@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Generic, NamedTuple
@@ -12,6 +13,7 @@ import numpy as np
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.io.person import write_person
 from shadowpuppet.pipeline.findings.camera import survey_camera
+from shadowpuppet.pipeline.findings.film import films_again
 from shadowpuppet.pipeline.findings.look import Look, RigLook, Survey
 from shadowpuppet.pipeline.findings.rig import survey_rig
 from shadowpuppet.pipeline.options import Options
@@ -21,7 +23,6 @@ from shadowpuppet.pipeline.progress import STAGES, Listener, generators
 from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.subject import Before, FittedPerson, Observation, State, TrackedSubject
-from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_blas_thread
 
 LOOKS_AGAIN = 3
@@ -36,7 +37,7 @@ class Kind(NamedTuple, Generic[State, Observation, Before]):
     settings: str
     """Name of the field of `Options` with the tracker's settings."""
     survey: Callable[..., Survey]
-    """Examines a rig with options and, after a first fit, with a `SceneHint` for each camera."""
+    """Examines a rig with options, for a listener, and after a first fit with films that were examined again."""
     fit: Callable[[np.random.Generator, Survey, Options], TrackedSubject[State, Observation, Before]]
     """Measures the person and makes the tracker."""
     stages: tuple[str, ...]
@@ -109,7 +110,7 @@ def fit_survey(rng: np.random.Generator, survey: Survey, options: Options, kind:
                cache: SilhouetteCache | None, listener: Listener) -> Prepared[State, Observation, Before]:
     """The surveyed recording and the person in it."""
     if survey.look.refusal is not None and not options.anyway:
-        return Prepared(survey, None, survey.look)
+        return Prepared(replace(survey, films=()), None, survey.look)
     listener.begin("measuring the person")
     try:
         subject = kind.fit(rng, survey, options)
@@ -124,7 +125,7 @@ def fit_survey(rng: np.random.Generator, survey: Survey, options: Options, kind:
         survey, subject = again, kind.fit(rng, again, options)
         if cache is not None:
             cache.keep(survey)
-    return Prepared(survey, subject, survey.look_with(subject.summary, subject.doubts))
+    return Prepared(replace(survey, films=()), subject, survey.look_with(subject.summary, subject.doubts))
 
 
 def _looked_again(survey: Survey, subject: FittedPerson, options: Options, kind: Kind[State, Observation, Before],
@@ -132,7 +133,6 @@ def _looked_again(survey: Survey, subject: FittedPerson, options: Options, kind:
     """The survey in which what never moves, and the fitted body leaves unexplained, belongs to the scene; None if there is nothing."""
     if all(each is None for each in subject.beside):
         return None
-    hints = tuple(SceneHint(beside, each.added) for beside, each in zip(subject.beside, survey.silhouettes, strict=True))
-    again = kind.survey(survey.rig, options, hints, listener)
-    more = any(new.added is not old.added for new, old in zip(again.silhouettes, survey.silhouettes))
-    return again if more and again.look.refusal is None else None
+    films = films_again(survey, options, subject.beside, listener)
+    again = None if films is None else kind.survey(survey.rig, options, listener, films)
+    return again if again is not None and again.look.refusal is None else None

@@ -23,15 +23,14 @@ from shadowpuppet.pipeline.findings.cautions import (
     sitting_cautions,
     unlike_ready,
 )
-from shadowpuppet.pipeline.findings.film import FilmSurvey, mean_overlap, survey_film
-from shadowpuppet.pipeline.findings.look import FirstSeconds, Look, Survey
+from shadowpuppet.pipeline.findings.film import mean_overlap, survey_films
+from shadowpuppet.pipeline.findings.look import FilmSurvey, FirstSeconds, Look, Survey
 from shadowpuppet.pipeline.footage import FIRST, CameraFrame, Footage, Sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.census import count_in_picture
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes
-from shadowpuppet.silhouette.added import SceneHint
 
 SHORT = 1.0
 """Length of a film, seconds, under which it is said to be short."""
@@ -42,16 +41,20 @@ UNEVEN = 0.1
 """Jitter over the frame interval above which the film's rate counts as variable."""
 
 
-def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), listener: Listener | None = None) -> Survey:
-    """Examine a recording of one camera; `hints` as in `survey_film`. Raises a `ShadowPuppetError` if something cannot be used."""
-    footage, steps = rig.footage[0], Steps(listener, rig.names, again=bool(hints))
-    film = survey_film(footage, options, hint=hints[0] if hints else SceneHint(), steps=steps)
+def survey_camera(rig: Rig, options: Options, listener: Listener | None = None, films: tuple[FilmSurvey, ...] = ()) -> Survey:
+    """Examine a recording of one camera; `films`: its film, if that was examined again. Raises a `ShadowPuppetError` if something cannot be
+    used."""
+    footage, steps = rig.footage[0], Steps(listener, rig.names, again=bool(films))
+    films = films or survey_films(rig, options, steps)
+    (film,) = films
     steps("silhouettes of the first seconds")
     look = _look(footage, film, options.tracker.body in WHOLE)
     if look.refusal and not options.anyway:
         return Survey(rig, (film.silhouettes,), (film.silhouettes,), FirstSeconds([], []), look)
     clean = clean_silhouettes(footage, film.sample, film.silhouettes, options)
-    return Survey(rig, (film.silhouettes,), (clean,), _first_people(film.sample, clean), look)
+    first = _first_people(film.sample, clean)
+    film.silhouettes.classified.forget()
+    return Survey(rig, (film.silhouettes,), (clean,), first, look, films=films)
 
 
 def _first_people(sample: Sample, clean: Silhouettes) -> FirstSeconds:
@@ -70,10 +73,10 @@ def _look(footage: Footage, film: FilmSurvey, whole: bool) -> Look:
     sample, camera = film.sample, footage.camera
     plain = [mask for frame in sample.frames if (mask := film.silhouettes.plain(frame)) is not None]
     look = Look(
-        recording=str(footage.recording.path), camera=camera.name, calibrated=camera.oriented, frames=footage.count,
-        looked_at=len(sample.times), rate=1 / sample.pace, jitter=sample.jitter, scale=known_scale(footage), area=_share(film.masks),
+        **vars(film.look), recording=str(footage.recording.path), camera=camera.name, calibrated=camera.oriented,
+        looked_at=len(sample.times), jitter=sample.jitter, scale=known_scale(footage), area=_share(film.masks),
         plain_area=_share(plain) if plain else None, exact_overlap_plain=mean_overlap(plain, film.exact),
-        refusal=recovery_doubt(film.silhouettes) or film.values["quality"].refusal(), **film.values,
+        refusal=recovery_doubt(film.silhouettes) or film.look.quality.refusal(),
     )  # fmt: skip
     if look.refusal:
         return look

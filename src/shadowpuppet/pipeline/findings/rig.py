@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -21,16 +20,15 @@ from shadowpuppet.pipeline.findings.cautions import (
     recovery_cautions,
     unlike_ready,
 )
-from shadowpuppet.pipeline.findings.film import FilmSurvey, brief_length, of_several, survey_film
-from shadowpuppet.pipeline.findings.look import CameraLook, FirstSeconds, RigLook, Survey
+from shadowpuppet.pipeline.findings.film import of_several, survey_films
+from shadowpuppet.pipeline.findings.look import CameraLook, FilmSurvey, FirstSeconds, RigLook, Survey
 from shadowpuppet.pipeline.findings.opening import OPENING, first_seconds, opening_of
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.census import Census, later_sets, sampled_sets, take_census
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
-from shadowpuppet.silhouette.added import SceneHint
-from shadowpuppet.threads import one_opencv_thread, usable_cores
+from shadowpuppet.threads import one_opencv_thread
 from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 from shadowpuppet.tracking.people.views import View, views_of
 
@@ -45,16 +43,11 @@ RATES, LENGTHS = 0.02, 0.1
 
 
 @one_opencv_thread()
-def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), listener: Listener | None = None) -> Survey:
-    """Examine each camera's film, and the first seconds of all together; `hints` as in `survey_film`, by camera. Raises a
+def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, films: tuple[FilmSurvey, ...] = ()) -> Survey:
+    """Examine each camera's film, and the first seconds of all together; `films`: the films, if they were examined again. Raises a
     `ShadowPuppetError` if something cannot be used."""
-    steps, opening = Steps(listener, rig.names, again=bool(hints)), opening_of(rig)
-
-    def surveyed(footage: Footage, hint: SceneHint) -> FilmSurvey:
-        return survey_film(footage, options, brief_length(footage, options), hint, steps, opening)
-
-    with ThreadPoolExecutor(usable_cores(), "look") as pool:
-        films = list(pool.map(surveyed, rig.footage, hints or [SceneHint()] * len(rig.footage)))
+    steps = Steps(listener, rig.names, again=bool(films))
+    apart = films = films or survey_films(rig, options, steps)
     silhouettes = tuple(film.silhouettes for film in films)
     census, spread, wide = None, list[Seen](), tuple(each.of_several() for each in silhouettes)
     if any(_shows_person(film) for film in films):
@@ -65,10 +58,10 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
         census, spread = take_census(rig.cameras, sampled, later), [*sampled, *later]
     several = census.number if census is not None and census.number > 1 else 0
     if several:
-        films = [of_several(film) for film in films]
+        films = tuple(map(of_several, films))
         silhouettes = tuple(film.silhouettes for film in films)
     steps("silhouettes of the first seconds in all films")
-    first = first_seconds(rig, silhouettes, [film.sample for film in films], opening, options.masks)
+    first = first_seconds(rig, silhouettes, [film.sample for film in films], opening_of(rig), options.masks)
     steps("do the cameras agree")
     agree = _agreement_of_people(rig, census, first) if census is not None and several else _agreement_of_one(rig, first, spread)
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
@@ -81,7 +74,9 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
         doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
                                  f"{several} people: each is tracked", NOTED))
     look = replace(look, refusal=refusal, doubts=() if refusal else tuple(doubts))
-    return Survey(rig, silhouettes, silhouettes, first, look, census)
+    for each in silhouettes:
+        each.classified.forget()
+    return Survey(rig, silhouettes, silhouettes, first, look, census, apart)
 
 
 def _agreement_of_one(rig: Rig, first: FirstSeconds, spread: Sequence[Seen] = ()) -> Agreement:
@@ -130,8 +125,8 @@ def _shows_person(film: FilmSurvey) -> bool:
 
 def _camera_look(footage: Footage, film: FilmSurvey) -> CameraLook:
     x, y, z = footage.view.camera.centre.tolist()
-    rate = 1 / film.sample.pace if len(film.sample.times) > 1 else footage.film.rate
-    return CameraLook(name=footage.camera.name, place=(x, y, z), frames=footage.count, rate=rate, start=footage.view.start, **film.values)
+    look = film.look if len(film.sample.times) > 1 else replace(film.look, rate=footage.film.rate)
+    return CameraLook(**vars(look), name=footage.camera.name, place=(x, y, z), start=footage.view.start)
 
 
 def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
