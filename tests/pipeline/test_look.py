@@ -195,7 +195,7 @@ def test_an_unknown_distance_before_a_camera_that_was_not_calibrated_is_no_good_
     footage = open_footage(recording, make_options({"height": 1.7}))
     footage = replace(footage, recording=replace(footage.recording, references=(), subject=Subject(height=1.7)))
     (doubt,) = [each for each in camera_doubts(replace(look, calibrated=calibrated), footage) if "distance" in each.short]
-    assert doubt.weight == weight
+    assert doubt.severity == weight
 
 
 def test_a_guessed_camera_is_said(recording, tmp_path):
@@ -212,7 +212,7 @@ def test_a_guessed_camera_is_said(recording, tmp_path):
 def test_a_head_that_never_moves_makes_a_recording_doubtful():
     scene = RecoveredScene(np.zeros((4, 4), np.uint8), np.ones((4, 4), bool), 60, head_still=True)
     (said, _) = recovery_cautions(["cam"], [Silhouettes("the film", None, recovered=scene)])
-    assert (said.weight, said.short) == (HARMFUL, "head never moves: film the empty scene")
+    assert (said.severity, said.short) == (HARMFUL, "head never moves: film the empty scene")
 
 
 def test_a_scene_taken_from_the_film_is_said(recording, tmp_path):
@@ -331,7 +331,7 @@ def test_arms_that_are_not_seen_and_trunks_that_are_too_deep_show_a_wrong_postur
 def seated_doubts(folder, motion, options=None):
     synthesize(replace(made.SPEC, motion=parse_gestures(motion)), folder, np.random.default_rng(3))
     survey = MONOCULAR.survey(open_rig(folder, options or Options()), options or Options())
-    return {doubt.short: doubt for doubt in survey.look.doubts}
+    return {doubt.short: doubt for doubt in survey.look.findings}
 
 
 def test_who_sits_down_later_is_told_from_who_bows(tmp_path):
@@ -342,7 +342,7 @@ def test_who_sits_down_later_is_told_from_who_bows(tmp_path):
 
 def test_feet_are_missed_only_where_legs_are_tracked(tmp_path):
     found = seated_doubts(tmp_path / "stands", "wave_hands 2", make_options({"body": "anatomical"}))
-    assert [(each.short, each.weight) for each in found.values()] == [("feet are cut off: step back, or tilt the camera", HARMFUL)]
+    assert [(each.short, each.severity) for each in found.values()] == [("feet are cut off: step back, or tilt the camera", HARMFUL)]
 
 
 # What is looked at
@@ -447,13 +447,13 @@ def found_without_references(overlaps: int, place: float) -> SizeFit:
 def test_a_distance_that_silhouettes_do_not_show_is_doubted():
     certain, uncertain = (_doubts(found_without_references(12, place), "proportions", 0.85, 12) for place in (0.8, 0.6))
     assert not certain
-    assert [doubt.startswith("at no distance a person who faces the camera") for doubt in uncertain] == [True]
+    assert [doubt.words.startswith("at no distance a person who faces the camera") for doubt in uncertain] == [True]
     assert not _doubts(found_without_references(12, np.nan), "proportions", 0.85, 12)
 
 
 def test_a_person_who_is_elsewhere_in_many_moments_is_doubted():
     (doubt,) = _doubts(found_without_references(8, 0.8), "proportions", 0.2, 12)
-    assert doubt.startswith("in 4 of 12 moments of the film the person is at another distance or height")
+    assert doubt.words.startswith("in 4 of 12 moments of the film the person is at another distance or height")
     assert not _doubts(found_without_references(10, 0.8), "proportions", 0.85, 12)
     known = replace(found_without_references(1, np.nan), overlaps={"front_t_pose": 0.9})
     assert not _doubts(known, "references", 0.85, 12)

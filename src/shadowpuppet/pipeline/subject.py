@@ -18,7 +18,7 @@ from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.camera.bits import Bits
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, Seen
-from shadowpuppet.errors import Caution
+from shadowpuppet.errors import Finding
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person
 from shadowpuppet.motion.contact.floor import under_feet
@@ -79,7 +79,7 @@ class FittedPerson:
     """Sizes that other runs can use, written to person.toml."""
     summary: dict[str, Any]
     """How the person was fitted, as plain values: the entry `person` of look.json."""
-    doubts: tuple[Caution, ...] = ()
+    doubts: tuple[Finding, ...] = ()
     """Doubts about the fit, a sentence each."""
     beside: tuple[BesideBody | None, ...] = ()
     """What the body leaves unexplained in each camera's silhouettes; empty, or None, for nothing."""

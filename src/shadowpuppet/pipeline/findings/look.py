@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from shadowpuppet.calibration.agreement import Agreement
 from shadowpuppet.camera.mask import Mask, Seen
-from shadowpuppet.errors import Caution
+from shadowpuppet.errors import Finding
 from shadowpuppet.pipeline.footage import Sample
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
@@ -71,10 +71,15 @@ class RecordingLook:
     person: dict[str, Any] | None = None
     """Sizes (m) and how they were found; with one camera also place (m) and overlaps of the fitted body, and the silhouettes it was fitted
     to if these are not the tracked ones. None if the person was not measured."""
-    doubts: tuple[Caution, ...] = ()
-    """Possible problems of the run with their remedies, a sentence each."""
+    findings: tuple[Finding, ...] = ()
+    """Possible problems of the run, with their remedies."""
     refusal: str | None = None
     """Why tracking is hopeless; None if it is not."""
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """The findings, a sentence each."""
+        return tuple(each.words for each in self.findings)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,6 +167,6 @@ class Survey:
         """Whether there are several people, each to be tracked."""
         return self.census is not None and self.census.number > 1
 
-    def look_with(self, person: dict[str, Any], doubts: tuple[Caution, ...]) -> Look | RigLook:
-        """A copy of `look` with the fitted person and the doubts about the fit."""
-        return replace(self.look, person=person, doubts=(*self.look.doubts, *doubts))
+    def look_with(self, person: dict[str, Any], findings: tuple[Finding, ...]) -> Look | RigLook:
+        """A copy of `look` with the fitted person and the findings about the fit."""
+        return replace(self.look, person=person, findings=(*self.look.findings, *findings))

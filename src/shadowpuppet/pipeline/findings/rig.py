@@ -9,7 +9,7 @@ import numpy as np
 
 from shadowpuppet.calibration.agreement import SETS_COMPARED, Agreement, agreement
 from shadowpuppet.camera.mask import Seen, may_be_person
-from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Finding
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.pipeline.findings.cautions import (
     GOOD,
@@ -71,9 +71,9 @@ def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, fil
     doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     doubts += [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
     if several:
-        doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
-                                 f"{several} people: each is tracked", NOTED))
-    look = replace(look, refusal=refusal, doubts=() if refusal else tuple(doubts))
+        doubts.insert(0, Finding.of("{people} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
+                                    "{people} people: each is tracked", NOTED, people=several))
+    look = replace(look, refusal=refusal, findings=() if refusal else tuple(doubts))
     for each in silhouettes:
         each.classified.forget()
     return Survey(rig, silhouettes, silhouettes, first, look, census, apart)
@@ -152,23 +152,24 @@ def _odd(rates: Array, look: RigLook) -> str:
     return f"camera {odd[0]!r} is" if len(odd) == 1 else f"cameras {', '.join(odd[:3])} are"
 
 
-def _rig_doubts(look: RigLook, several: bool = False, recovered: frozenset[str] = frozenset()) -> list[Caution]:
+def _rig_doubts(look: RigLook, several: bool = False, recovered: frozenset[str] = frozenset()) -> list[Finding]:
     """Doubts about a rig; of `several` people the quality of silhouettes, which supposes one, says nothing; silhouettes against an empty
     scene that was `recovered` from the films of these cameras may themselves be why the cameras do not fit together."""
     unclear = bool(recovered) and look.agreement.remedy is None
-    doubts = [Caution(doubt, SILHOUETTES_OR_CAMERAS, RUINOUS) if unclear and doubt.weight == RUINOUS else doubt
+    doubts = [replace(doubt, short=SILHOUETTES_OR_CAMERAS) if unclear and doubt.severity == RUINOUS else doubt
               for doubt in look.agreement.doubts()]
     rates = np.array([camera.rate for camera in look.cameras])
     ends = {camera.name: camera.frames / camera.rate for camera in look.cameras if camera.frames is not None}
     if np.ptp(rates) > RATES * rates.min():
         listed = ", ".join(f"{camera.name} {camera.rate:.4g}" for camera in look.cameras)
-        doubts.append(Caution(f"the films have different rates (frames/s: {listed}): they are aligned by their times, {look.rate:.4g} sets "
-                              "a second, and a camera without a picture of a moment is left out of it; film at one rate",
-                              f"{_odd(rates, look)} of another frame rate: film at one", NOTED))
+        doubts.append(Finding.of("the films have different rates (frames/s: {listed}): they are aligned by their times, {sets:.4g} sets a "
+                                 "second, and a camera without a picture of a moment is left out of it; film at one rate",
+                                 "{odd} of another frame rate: film at one", NOTED, listed=listed, sets=look.rate, odd=_odd(rates, look)))
     elif ends and max(ends.values()) - min(ends.values()) > LENGTHS and not any(camera.start for camera in look.cameras):
         listed = ", ".join(f"{name} {end:.2f}" for name, end in ends.items())
-        doubts.append(Caution(f"the films have different lengths (s: {listed}): were they begun together? say in [start] of recording.toml "
-                              "when each began", "films differ in length: begun together? see [start]", NOTED))
+        doubts.append(Finding.of("the films have different lengths (s: {listed}): were they begun together? say in [start] of "
+                                 "recording.toml when each began", "films differ in length: begun together? see [start]", NOTED,
+                                 listed=listed))
     whole = sum(not camera.quality.cut_off and not camera.quality.refusal() for camera in look.cameras)
     if not several:
         doubts += feet_cautions({camera.name: camera.quality.border["bottom"] for camera in look.cameras if not camera.quality.refusal()})
@@ -178,6 +179,6 @@ def _rig_doubts(look: RigLook, several: bool = False, recovered: frozenset[str] 
         quality = () if several else camera.quality.warnings(whole >= ENOUGH)
         warnings = (*condition_cautions(camera.condition, camera.name in recovered), *clutter_cautions(camera.left_out), *quality)
         doubts += [warning.about(f"camera {camera.name!r}").at_most(HARMFUL) for warning in warnings]
-        doubts += [Caution(f"camera {camera.name!r}: {why}", f"camera {camera.name!r} shows no usable silhouette", HARMFUL)
+        doubts += [Finding(f"camera {camera.name!r}: {why}", f"camera {camera.name!r} shows no usable silhouette", HARMFUL)
                    for why in [camera.quality.refusal()] if why]
     return doubts

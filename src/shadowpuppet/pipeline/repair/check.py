@@ -267,7 +267,7 @@ def doubts_of(check: CalibrationCheck) -> list[str]:
         said.append(f"the films do not begin together ({text}): put into [start] of recording.toml: {start}")
     if found.hopeless and found.remedy is not None:
         return [*said, found.remedy]
-    said += [doubt for doubt in found.doubts() if not any(f"camera {name!r} disagrees" in doubt for name in check.turns)]
+    said += [str(doubt) for doubt in found.doubts() if not any(f"camera {name!r} disagrees" in doubt for name in check.turns)]
     for name in check.turns or (() if found.doubts() else _standing_out(found, STANDOUT_FACTOR)):
         others = [other for other in found.names if other != name]
         rest = max(value for other, value in zip(found.names, found.apart) if other != name and value is not None)
