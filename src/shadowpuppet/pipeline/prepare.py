@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Generic, NamedTuple
@@ -110,7 +109,7 @@ def fit_survey(rng: np.random.Generator, survey: Survey, options: Options, kind:
                cache: SilhouetteCache | None, listener: Listener) -> Prepared[State, Observation, Before]:
     """The surveyed recording and the person in it."""
     if survey.look.refusal is not None and not options.anyway:
-        return Prepared(replace(survey, films=()), None, survey.look)
+        return Prepared(survey.settled(), None, survey.look)
     listener.begin("measuring the person")
     try:
         subject = kind.fit(rng, survey, options)
@@ -125,7 +124,7 @@ def fit_survey(rng: np.random.Generator, survey: Survey, options: Options, kind:
         survey, subject = again, kind.fit(rng, again, options)
         if cache is not None:
             cache.keep(survey)
-    return Prepared(replace(survey, films=()), subject, survey.look_with(subject.summary, subject.doubts))
+    return Prepared(survey.settled(), subject, survey.look_with(subject.summary, subject.doubts))
 
 
 def _looked_again(survey: Survey, subject: FittedPerson, options: Options, kind: Kind[State, Observation, Before],

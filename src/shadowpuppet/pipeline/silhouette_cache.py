@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -126,13 +126,13 @@ class SilhouetteCache:
         if self._survey is None or film != self._film:
             self.forget()
             survey = make(rig, options)
-            self._survey, self._film = replace(survey, films=()), film
+            self._survey, self._film = survey.settled(), film
             return survey
         return self._survey
 
     def keep(self, survey: Survey) -> None:
         """Keep another survey of the same film, whose silhouettes differ."""
-        self._survey, self._store = replace(survey, films=()), MaskStore(self.limit)
+        self._survey, self._store = survey.settled(), MaskStore(self.limit)
 
     def is_complete(self, options: Options) -> bool:
         """Whether all silhouettes of the surveyed recording are kept and can be used; not with an overlay, which needs the images."""

@@ -167,6 +167,10 @@ class Survey:
         """Whether there are several people, each to be tracked."""
         return self.census is not None and self.census.number > 1
 
+    def settled(self) -> Survey:
+        """The survey without the films' samples, which nothing needs once the person is measured."""
+        return replace(self, films=())
+
     def look_with(self, person: dict[str, Any], findings: tuple[Finding, ...]) -> Look | RigLook:
         """A copy of `look` with the fitted person and the findings about the fit."""
         return replace(self.look, person=person, findings=(*self.look.findings, *findings))
