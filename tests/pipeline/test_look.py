@@ -14,7 +14,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import HARMFUL, NOTED, RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
 from shadowpuppet.io.recording import Subject
 from shadowpuppet.pipeline.findings.camera import _doubts as camera_doubts
-from shadowpuppet.pipeline.findings.camera import _look
+from shadowpuppet.pipeline.findings.camera import _look, survey_camera
 from shadowpuppet.pipeline.findings.cautions import recovery_cautions
 from shadowpuppet.pipeline.findings.film import quality_of, survey_film
 from shadowpuppet.pipeline.footage import FIRST, FIRST_SECONDS, LOOKED_AT, RUN, RUNS, _spread, open_footage, take_sample
@@ -24,7 +24,7 @@ from shadowpuppet.pipeline.prepare import MONOCULAR, Prepared, look_at, prepare
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes, read_masks
 from shadowpuppet.pipeline.track import json_text, track_recording
-from shadowpuppet.silhouette import RecoveredScene
+from shadowpuppet.silhouette import RecoveredScene, Segmenter
 from shadowpuppet.silhouette.quality import mask_quality
 from shadowpuppet.synthetic import synthesize
 from shadowpuppet.synthetic.spec_changes import parse_gestures
@@ -68,6 +68,19 @@ def test_a_look_tells_whether_the_person_fits(look):
     assert look.person["start_overlap"] > 0.85
     assert look.person["distance"] == pytest.approx(2.0)
     assert set(look.person["sizes"]) == set(sizes_from_height(1.7).names())
+
+
+def test_each_sampled_frame_is_classified_once(recording, monkeypatch):
+    """However many look at it: the masks, the count of people, the first seconds."""
+    seen, labelled = [], Segmenter.labelled
+    monkeypatch.setattr(Segmenter, "labelled", lambda self, image: seen.append(image) or labelled(self, image))
+    survey = survey_camera(open_rig(recording, Options()), Options())
+    (film,) = survey.films
+    assert len(seen) < len(film.sample.frames) + len(film.sample.first)
+    assert all(sum(each is frame.image for each in seen) == 1 for frame in film.sample.frames)
+    assert not film.silhouettes.classified  # nothing is held any longer
+    first, (mask,) = film.sample.frames[0], survey.first.masks[0]
+    np.testing.assert_array_equal(film.silhouettes(first), mask)
 
 
 def test_a_look_is_plain(look):

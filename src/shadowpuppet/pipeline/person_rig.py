@@ -7,7 +7,7 @@ from collections.abc import Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -165,8 +165,9 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
     person = estimate_sizes(rng, partial(make_body, settings.body), sizes, spread, cameras, first, settings, library,
                             len(first) // 2 if settings.patience else 0, shared, begin, both_fronts)
     prior = known.prior if settings.method == "hybrid" else None
-    summary: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,
-                               "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
+    summary: dict[str, object] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual,
+                                  "frames": person.frames,
+                                  "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
     tracker = MultiviewTracker(person.body, tuple(cameras), for_rate(settings, rate), prior, library,
                                looks=looks_in(settings.patience, rate), carve=hull.points if settings.odd_camera else None)
     return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull, tracker=tracker,
@@ -203,7 +204,7 @@ def average_person(rng: np.random.Generator, cameras: Sequence[Camera], options:
 
 
 def known_person(rng: np.random.Generator, cameras: Sequence[Camera], options: Options, rate: float, person: Person,
-                 summary: dict[str, Any], is_measured: bool) -> MultiviewSubject:
+                 summary: dict[str, object], is_measured: bool) -> MultiviewSubject:
     """A person of known sizes, without training motion, as `fit_in_views` makes one; `summary`: how they were found."""
     settings = options.multiview
     known, hull = familiar(rng, options, None, settings.body, rate), VisualHull(cameras, settings.hull)

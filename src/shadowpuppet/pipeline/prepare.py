@@ -10,18 +10,21 @@ from typing import Generic, NamedTuple
 import numpy as np
 
 from shadowpuppet.errors import TrackingError
-from shadowpuppet.io.person import write_person
+from shadowpuppet.io.inputs.inputs import Resuming
+from shadowpuppet.io.person import read_person, write_person
+from shadowpuppet.io.prior import read_prior
+from shadowpuppet.io.run_writer import RunWriter
 from shadowpuppet.pipeline.findings.camera import survey_camera
 from shadowpuppet.pipeline.findings.film import films_again
 from shadowpuppet.pipeline.findings.look import Look, RigLook, Survey
 from shadowpuppet.pipeline.findings.rig import survey_rig
-from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.options import Options, check_used, plain_options
 from shadowpuppet.pipeline.person import fit_monocular
 from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.progress import STAGES, Listener, generators
 from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
-from shadowpuppet.pipeline.subject import Before, FittedPerson, Observation, State, TrackedSubject
+from shadowpuppet.pipeline.subject import Before, FittedPerson, Observation, State, TrackedSubject, average_body, joint_names
 from shadowpuppet.threads import one_blas_thread
 
 LOOKS_AGAIN = 3
@@ -90,6 +93,25 @@ def fit_person(recording: str | Path, file: str | Path, options: Options | None 
     subject = prepared.check()
     write_person(file, subject.person)
     return subject, prepared.look
+
+
+def check_options(options: Options, rig: Rig) -> None:
+    """Raise `SettingsError` for options that have no effect on a rig, `FormatError` for a person or a prior that cannot be read, before the
+    recording is examined."""
+    check_used(options, rig.is_multiview)
+    if options.person is not None:
+        read_person(options.person, (options.multiview if rig.is_multiview else options.tracker).body)
+    if options.prior is not None and rig.is_multiview:
+        read_prior(options.prior)
+
+
+def run_writer(rig: Rig, kind: Kind[State, Observation, Before], folder: str | Path, options: Options, resume: bool) -> RunWriter:
+    """The writer of a run's folder; `resume`: an earlier run there goes on."""
+    body, recording = average_body(getattr(options, kind.settings).body), rig.recording
+    info = {"recording": recording.path.resolve(), "method": kind.name(options.preset, len(rig.cameras)),
+            "cameras": list(rig.names) if rig.is_multiview else None, "settings": plain_options(options),
+            "truth": recording.truth and recording.truth.resolve(), "begin": recording.begin or None, "end": recording.duration}
+    return RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, Resuming(resume, rig.inputs))
 
 
 def look_around(rig: Rig, options: Options, kind: Kind[State, Observation, Before], cache: SilhouetteCache | None = None,

@@ -17,11 +17,10 @@ from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
-from shadowpuppet.pipeline.prepare import MONOCULAR, MULTIVIEW, Kind, Prepared, fit_survey, look_around
-from shadowpuppet.pipeline.progress import Listener, StageTimer, Summary, generators, json_text, set_aside, timings, tracked
+from shadowpuppet.pipeline.prepare import MONOCULAR, MULTIVIEW, Kind, Prepared, check_options, fit_survey, look_around, run_writer
+from shadowpuppet.pipeline.progress import Listener, StageTimer, Summary, generators, json_text, judge, set_aside, summary, timings, tracked
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
-from shadowpuppet.pipeline.stages.judge import check_options, judge, run_writer, summary
 from shadowpuppet.pipeline.stages.smooth import backward, check_smoothing, smooth_run
 from shadowpuppet.pipeline.stages.write import Written
 from shadowpuppet.pipeline.subject import Before, Observation, State, motion_frame
@@ -68,9 +67,8 @@ def run(rig: Rig, kind: Kind[State, Observation, Before], folder: str | Path, op
         writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)
         check_smoothing(options, prepared.look.rate)
-        subject, store = prepared.check(), MaskStore()
-        store = store if subject.both_ways and options.smoothing[0] != "off" else None
-        leans, state = _track(writer, prepared, kind, options, listener, for_track, cache, store)
+        subject = prepared.check()
+        leans, state, store = _track(writer, prepared, kind, options, listener, for_track, cache)
         motion = writer.motion if store is None else backward(writer, subject.turned_back(state), options, listener, store)
         smooth_run(writer, [(0, subject)], options, listener, motion, leans)
         found = judge(writer, rig, prepared.look, subject.person, options)
@@ -98,11 +96,12 @@ def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: L
 
 
 def _track(writer: RunWriter, prepared: Prepared[State, Observation, Before], kind: Kind[State, Observation, Before], options: Options,
-           listener: Listener, rng: np.random.Generator, cache: SilhouetteCache | None,
-           store: MaskStore | None) -> tuple[Sequence[float], State | None]:
-    """Decode, segment, observe, track, doubt and write each frame set. Returns the `lean` of each, and the last state. `store`: is filled
-    with the silhouettes."""
+           listener: Listener, rng: np.random.Generator,
+           cache: SilhouetteCache | None) -> tuple[Sequence[float], State | None, MaskStore | None]:
+    """Decode, segment, observe, track, doubt and write each frame set. Returns the `lean` of each, the last state, and the silhouettes if
+    they are to be tracked backward, too."""
     subject, survey, timer = prepared.check(), prepared.survey, StageTimer()
+    store = MaskStore() if subject.both_ways and options.smoothing[0] != "off" else None
     rows, watch = Written(writer, prepared, options, rng), RigWatch(len(survey.rig.footage), survey.rig.short)
     state, before = rows.carried.state, rows.carried.before
     listener.begin("tracking", tracked(prepared.look.frames, options.every))
@@ -127,7 +126,7 @@ def _track(writer: RunWriter, prepared: Prepared[State, Observation, Before], ki
     finally:
         writer.metrics |= timings(timer, kind.stages, rows.count - len(rows.earlier), time.perf_counter() - began)
         writer.metrics |= rows.left_out | set_aside(watch.intervals, survey.rig.names)
-    return rows.leans, state
+    return rows.leans, state, store
 
 
 def _segmented(stack: ExitStack, survey: Survey, options: Options, watch: RigWatch, cache: SilhouetteCache | None,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import fields, replace
+import json
+from dataclasses import FrozenInstanceError, fields, replace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from shadowpuppet.pipeline.findings.verdict import (
     verdict_of_look,
     verdict_of_run,
 )
+from shadowpuppet.pipeline.progress import json_text
 from shadowpuppet.silhouette.correction.condition import FilmCondition
 from shadowpuppet.silhouette.quality import MaskQuality
 
@@ -56,6 +58,21 @@ def test_a_finding_reads_as_its_sentence_and_survives_copies():
     assert made.at_most(RUINOUS).severity == HARMFUL
     about = made.about("camera 'a'")
     assert (str(about), about.short, about.severity) == ("camera 'a': long and whole", "camera 'a': short", HARMFUL)
+
+
+def test_a_findings_words_hold_its_figures_and_no_name_in_them_is_a_figure():
+    made = Finding.of("camera {camera!r} moved by {pixels:.1f} pixels", "{camera}: {pixels:.0f} px", HARMFUL, camera="{pixels}", pixels=2.6)
+    assert (made.words, made.short) == ("camera '{pixels}' moved by 2.6 pixels", "{pixels}: 3 px")
+    assert made.evidence == {"camera": "{pixels}", "pixels": 2.6}
+    assert made.about("film").evidence == made.at_most(NOTED).evidence == made.evidence
+    assert "2.6 pixels" in made
+    with pytest.raises(FrozenInstanceError):
+        made.words = "nothing"
+
+
+def test_findings_are_saved_with_their_evidence():
+    (saved,) = json.loads(json_text(replace(LOOK, findings=(Finding.of("{x:.1f}", "x", NOTED, x=np.float64(1.25)),))))["findings"]
+    assert saved == {"words": "1.2", "short": "x", "severity": NOTED, "evidence": {"x": 1.25}}
 
 
 def test_a_recording_that_cannot_be_tracked_is_bad():

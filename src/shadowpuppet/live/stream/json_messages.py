@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -36,7 +35,7 @@ def framed(frame: StreamFrame) -> str:
     })  # fmt: skip
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     return json.dumps(value, allow_nan=False, separators=(",", ":"))
 
 
@@ -44,5 +43,5 @@ def _number(value: float | None, digits: int) -> float | None:
     return None if value is None or not np.isfinite(value) else round(float(value), digits)
 
 
-def _numbers(values: Array | None, digits: int) -> Any:
+def _numbers(values: Array | None, digits: int) -> object:
     return None if values is None else (np.round(values, digits) + 0.0).tolist()

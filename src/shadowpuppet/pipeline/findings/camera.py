@@ -13,7 +13,6 @@ from shadowpuppet.body.models import WHOLE
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.errors import HARMFUL, NOTED, Finding
 from shadowpuppet.pipeline.findings.cautions import (
-    GOOD,
     clutter_cautions,
     condition_cautions,
     feet_cautions,
@@ -126,9 +125,7 @@ def _doubts(look: Look, footage: Footage) -> list[Finding]:
     if look.jitter * look.rate > UNEVEN:
         doubts.append(Finding.of("the time from frame to frame varies by {percent:.0f} %: the film's own times are kept",
                                  "frames come unevenly: their own times are kept", NOTED, percent=100 * look.jitter * look.rate))
-    if look.exact_overlap is not None and look.exact_overlap < GOOD:
-        doubts.append(unlike_ready(look.exact_overlap))
-    return [*doubts, *condition_cautions(look.condition, footage.view.background is None)]
+    return [*doubts, *unlike_ready(look.exact_overlap), *condition_cautions(look.condition, footage.view.background is None)]
 
 
 def _share(masks: Sequence[Mask]) -> float:

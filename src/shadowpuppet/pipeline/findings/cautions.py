@@ -110,10 +110,13 @@ def film_cautions(footage: Footage) -> list[Finding]:
     return said
 
 
-def unlike_ready(overlap: float) -> Finding:
+def unlike_ready(overlap: float | None) -> list[Finding]:
     """Silhouettes that overlap the ready ones by too little."""
-    return Finding.of("the silhouettes overlap the ready ones in masks/ by {overlap:.2f} only: try another --silhouette.method, or --masks",
-                      "silhouettes differ from those in masks/: use --masks", HARMFUL, overlap=overlap)
+    if overlap is None or overlap >= GOOD:
+        return []
+    return [Finding.of("the silhouettes overlap the ready ones in masks/ by {overlap:.2f} only: try another --silhouette.method, or "
+                       "--masks",
+                      "silhouettes differ from those in masks/: use --masks", HARMFUL, overlap=overlap)]
 
 
 def condition_cautions(condition: FilmCondition | None, recovered: bool) -> tuple[Finding, ...]:

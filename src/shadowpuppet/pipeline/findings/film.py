@@ -164,19 +164,14 @@ def quality_of(runs: Sequence[Sequence[Mask]], starts: Sequence[int], ready: boo
     parts = [mask_quality(run) for run in runs]
     frames = np.array([part.frames for part in parts], float)
 
-    def mean(name: str) -> float:
-        return float(np.average([getattr(part, name) for part in parts], weights=frames))
+    def each(*names: str) -> dict[str, list[float]]:
+        return {name: [getattr(part, name) for part in parts] for name in names}
 
-    def median(name: str) -> float:
-        return float(np.median([getattr(part, name) for part in parts]))
-
-    def first(name: str) -> int | None:
-        return min((start + n for part, start in zip(parts, starts) if (n := getattr(part, name)) is not None), default=None)
-
-    border = {side: float(np.average([part.border[side] for part in parts], weights=frames)) for side in parts[0].border}
-    return MaskQuality(
-        frames=int(frames.sum()), area=median("area"), area_change=median("area_change"), area_jumps=mean("area_jumps"),
-        flicker=median("flicker"), border=border, specks=mean("specks"), speck_area=mean("speck_area"), holes=mean("holes"),
-        hole_area=mean("hole_area"), empty=sum(part.empty for part in parts), full=sum(part.full for part in parts),
-        first_empty=first("first_empty"), first_full=first("first_full"), ready=ready,
-    )  # fmt: skip
+    means = each("area_jumps", "specks", "speck_area", "holes", "hole_area") | {
+        side: [part.border[side] for part in parts] for side in parts[0].border}  # fmt: skip
+    mean = {name: float(np.average(values, weights=frames)) for name, values in means.items()}
+    median = {name: float(np.median(values)) for name, values in each("area", "area_change", "flicker").items()}
+    first = {name: min((start + n for n, start in zip(values, starts) if n is not None), default=None)
+             for name, values in each("first_empty", "first_full").items()}  # fmt: skip
+    return MaskQuality(frames=int(frames.sum()), border={side: mean.pop(side) for side in parts[0].border}, ready=ready,
+                       empty=sum(part.empty for part in parts), full=sum(part.full for part in parts), **mean, **median, **first)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from shadowpuppet.calibration.agreement import Agreement
 from shadowpuppet.camera.mask import Mask, Seen
@@ -68,7 +68,7 @@ class RecordingLook:
     """Frames, or frame sets of several cameras, a second."""
     frames: int | None
     """Number of frames or frame sets; None if the films do not state it."""
-    person: dict[str, Any] | None = None
+    person: dict[str, object] | None = None
     """Sizes (m) and how they were found; with one camera also place (m) and overlaps of the fitted body, and the silhouettes it was fitted
     to if these are not the tracked ones. None if the person was not measured."""
     findings: tuple[Finding, ...] = ()
@@ -171,6 +171,6 @@ class Survey:
         """The survey without the films' samples, which nothing needs once the person is measured."""
         return replace(self, films=())
 
-    def look_with(self, person: dict[str, Any], findings: tuple[Finding, ...]) -> Look | RigLook:
+    def look_with(self, person: dict[str, object], findings: tuple[Finding, ...]) -> Look | RigLook:
         """A copy of `look` with the fitted person and the findings about the fit."""
         return replace(self.look, person=person, findings=(*self.look.findings, *findings))

@@ -12,7 +12,6 @@ from shadowpuppet.camera.mask import Seen, may_be_person
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Finding
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.pipeline.findings.cautions import (
-    GOOD,
     clutter_cautions,
     condition_cautions,
     feet_cautions,
@@ -174,8 +173,7 @@ def _rig_doubts(look: RigLook, several: bool = False, recovered: frozenset[str] 
     if not several:
         doubts += feet_cautions({camera.name: camera.quality.border["bottom"] for camera in look.cameras if not camera.quality.refusal()})
     for camera in look.cameras:
-        if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
-            doubts.append(unlike_ready(camera.exact_overlap).about(f"camera {camera.name!r}"))
+        doubts += [unlike.about(f"camera {camera.name!r}") for unlike in unlike_ready(camera.exact_overlap)]
         quality = () if several else camera.quality.warnings(whole >= ENOUGH)
         warnings = (*condition_cautions(camera.condition, camera.name in recovered), *clutter_cautions(camera.left_out), *quality)
         doubts += [warning.about(f"camera {camera.name!r}").at_most(HARMFUL) for warning in warnings]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,16 @@ MEAN_DISTANCE = 2 * np.sqrt(2 / np.pi) / np.sqrt(3)
 """Mean length of a vector of three independent normal errors, over the root of the sum of their variances."""
 
 
+class SetAside(TypedDict):
+    """A camera that was set aside for a time, or was blind, in metrics.json."""
+
+    camera: str
+    why: str
+    frames: int
+    from_s: float
+    to_s: float
+
+
 class Verdict(NamedTuple):
     """A verdict and its reasons."""
 
@@ -45,7 +55,7 @@ class Verdict(NamedTuple):
     reasons: tuple[str, ...]
     """At most three, the weightiest first, each with what to do in at most ten words."""
 
-    def plain(self) -> dict[str, Any]:
+    def plain(self) -> dict[str, str | list[str]]:
         """The verdict for JSON."""
         return {"word": self.word, "reasons": list(self.reasons)}
 
@@ -68,7 +78,7 @@ def verdict_of_look(look: Look | RigLook) -> Verdict:
     return Verdict("bad", (look.refusal,)) if look.refusal is not None else verdict_of(look.findings)
 
 
-def verdict_of_run(look: Look | RigLook, motion: Motion, aside: Sequence[Mapping[str, Any]] = (),
+def verdict_of_run(look: Look | RigLook, motion: Motion, aside: Sequence[SetAside] = (),
                    frames: tuple[int, int | None] | None = None) -> Verdict:
     """The verdict on a run of a recording, from what the look found and what the run states of itself.
 
@@ -100,7 +110,7 @@ def lost_share(motion: Motion) -> float:
     return float(np.count_nonzero(motion.status == "lost") / present) if present else 0.0
 
 
-def blind_frames(motion: Motion, aside: Sequence[Mapping[str, Any]], cameras: int) -> NDArray[np.bool_]:
+def blind_frames(motion: Motion, aside: Sequence[SetAside], cameras: int) -> NDArray[np.bool_]:
     """Frames (T,) in which all cameras were blind, from the entry `set_aside` of metrics.json: no picture could have shown the person."""
     blind = np.zeros((cameras, len(motion)), bool)
     names = list(dict.fromkeys(one["camera"] for one in aside))
@@ -125,7 +135,7 @@ def _mean_error(deviations: NDArray[np.float64]) -> float:
     return float(np.where(np.isfinite(lengths), lengths, LOST_ERROR).mean())
 
 
-def _without_cameras(aside: Sequence[Mapping[str, Any]], frames: int) -> Iterator[Finding]:
+def _without_cameras(aside: Sequence[SetAside], frames: int) -> Iterator[Finding]:
     """A reason for each camera that was set aside, and why."""
     for camera, why in dict.fromkeys((one["camera"], one["why"]) for one in aside):
         times = [one for one in aside if (one["camera"], one["why"]) == (camera, why)]

@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from functools import partial
-from typing import Any, Generic, NamedTuple
+from typing import Generic, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from shadowpuppet.pipeline.progress import (
     FALLBACK_RATE,
     Checkpoints,
     LeftOut,
+    LeftOutEntry,
     add_left_out,
     is_same_look,
     json_text,
@@ -35,7 +36,7 @@ class Carried(NamedTuple, Generic[State, Before]):
 
     look: str
     """The text of look.json."""
-    generator: Mapping[str, Any]
+    generator: Mapping[str, object]
     """State of the random generator."""
     state: State | None
     """The tracker's; None while there is no person."""
@@ -87,7 +88,7 @@ class Written(Generic[State, Observation, Before]):
         self.count += 1
 
     @property
-    def left_out(self) -> dict[str, Any]:
+    def left_out(self) -> dict[str, list[LeftOutEntry]]:
         """The entry `left_out` of metrics.json."""
         return left_out_metrics(self._left_out, [footage.view.camera for footage in self.survey.rig.footage])
 
