@@ -17,11 +17,11 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.metrics import UPPER_JOINTS, joint_errors
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.pipeline.look import Survey
+from shadowpuppet.pipeline.findings.camera import survey_camera
+from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import fit_monocular
 from shadowpuppet.pipeline.rig import Rig, open_rig
-from shadowpuppet.pipeline.survey.camera import survey_camera
 from shadowpuppet.tracking.arm_colours import ColourCounts
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate

@@ -21,10 +21,10 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import BLANK, JointTable, Mode, MotionBuilder, MotionFrame
 from shadowpuppet.motion.synchronization import at_times
+from shadowpuppet.pipeline.findings.rig import survey_rig
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.rig import open_rig, read_frames
-from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.synthetic import proving_rings, synthesize
 from shadowpuppet.tracking.doubt.doubt import Points, pose_deviations, state_doubt
 from shadowpuppet.tracking.doubt.monocular import MonocularDoubt

@@ -37,10 +37,10 @@ from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.metrics import FAR_ERROR, LOST_ERROR, joint_errors, overlap
 from shadowpuppet.motion.motion import JointTable, Motion
+from shadowpuppet.pipeline.findings.verdict import expected_error
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
 from shadowpuppet.pipeline.track import Summary, track_recording
-from shadowpuppet.pipeline.verdict.of_run import expected_error
 from shadowpuppet.synthetic import Spec, read_spec, synthesize
 from shadowpuppet.synthetic.faults.kinds import KINDS
 from shadowpuppet.video import open_frames

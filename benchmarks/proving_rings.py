@@ -38,11 +38,11 @@ from shadowpuppet.camera.mask import Seen
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.pipeline.findings.rig import survey_rig
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, fit_multiview
 from shadowpuppet.pipeline.rig import open_rig, read_frames
 from shadowpuppet.pipeline.silhouette_cache import MaskStore
-from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.synthetic import Spec, proving_rings
 from shadowpuppet.synthetic.person.mannequin import Mannequin, PersonKind
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull

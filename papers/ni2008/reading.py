@@ -21,9 +21,9 @@ from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.pipeline.findings.rig import survey_rig
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.rig import open_rig, read_frames
-from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.person_renderer import PersonRenderer

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from shadowpuppet.motion.prior.motion_prior import MotionPrior
     from shadowpuppet.motion.prior.settings import PriorSettings
     from shadowpuppet.motion.prior.vqpca import choose_regions, fit_prior
+    from shadowpuppet.pipeline.findings.look import Look
     from shadowpuppet.pipeline.footage import open_footage
-    from shadowpuppet.pipeline.look import Look
     from shadowpuppet.pipeline.options import Options, make_options
     from shadowpuppet.pipeline.prepare import look_at
     from shadowpuppet.pipeline.silhouettes import read_masks
@@ -53,7 +53,7 @@ _HOMES = {
     "read_calibration": "io.calibration.calibration_files", "write_calibration": "io.calibration.calibration_files",
     "read_joints": "io.motion.table", "write_joints": "io.motion.table", "Person": "io.person", "read_person": "io.person",
     "write_person": "io.person", "Recording": "io.recording", "read_recording": "io.recording", "Run": "io.run", "read_run": "io.run",
-    "Look": "pipeline.look", "evaluate": "motion.metrics", "JointTable": "motion.motion", "Motion": "motion.motion",
+    "Look": "pipeline.findings.look", "evaluate": "motion.metrics", "JointTable": "motion.motion", "Motion": "motion.motion",
     "Options": "pipeline.options", "make_options": "pipeline.options", "Listener": "pipeline.track", "look_at": "pipeline.prepare",
     "track_recording": "pipeline.track", "Picture": "camera.rasterize", "MonocularSettings": "tracking.monocular.settings",
     "make_settings": "tracking.monocular.settings", "SilhouetteSettings": "silhouette", "learn_background": "silhouette",

@@ -8,12 +8,13 @@ import shlex
 import stat
 import sys
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
 NOTED, HARMFUL, RUINOUS = 1, 2, 3
-"""Weights of a `Caution`."""
+"""Severities of a `Finding`."""
 BROKEN, MISTAKE, SOME_FAILED, PERSON_LOST, INTERRUPTED = 1, 2, 3, 4, 130
 """Exit codes other than 0: the core does not work on this machine (`doctor`) or a bug of the program; unusable input; some of several runs
 failed (`batch`); a run that lost the person in most frames (`track`); Ctrl-C."""
@@ -77,30 +78,39 @@ class SettingsError(ShadowPuppetError, ValueError):
     """A setting with an unknown name or an impossible value."""
 
 
-class Caution(str):
-    """What may harm a run, and its remedy, in a sentence; `short` says both in at most ten words."""
+@dataclass(frozen=True)
+class Finding:
+    """What was found of a recording or a run that may harm it, and the remedy."""
 
+    words: str
+    """A sentence."""
     short: str
-    weight: int
+    """The same in at most ten words."""
+    severity: int
     """`NOTED`: lengths or details may be off; `HARMFUL`: joints are; `RUINOUS`: most of the run is."""
+    evidence: Mapping[str, float | str] = field(default_factory=dict, hash=False)
+    """The measured figures that say so, by name."""
 
-    def __new__(cls, sentence: str, short: str, weight: int) -> Caution:
-        """A sentence with its short form and weight."""
-        made = super().__new__(cls, sentence)
-        made.short, made.weight = short, weight
-        return made
+    @classmethod
+    def of(cls, words: str, short: str, severity: int, **evidence: float | str) -> Finding:
+        """A finding whose words hold its figures' names in braces, with their formats."""
+        return cls(words.format_map(evidence), short.format_map(evidence), severity, evidence)
 
-    def __reduce__(self) -> tuple[type[Caution], tuple[str, str, int]]:
-        """How it is copied."""
-        return Caution, (str(self), self.short, self.weight)
+    def __str__(self) -> str:
+        """The sentence."""
+        return self.words
 
-    def at_most(self, weight: int) -> Caution:
-        """The same caution, with this weight if its own is greater."""
-        return Caution(str(self), self.short, min(self.weight, weight))
+    def __contains__(self, text: str) -> bool:
+        """Whether the sentence has a text."""
+        return text in self.words
 
-    def about(self, what: str) -> Caution:
-        """The same caution about one camera or file, which both forms name first."""
-        return Caution(f"{what}: {self}", f"{what}: {self.short}", self.weight)
+    def at_most(self, severity: int) -> Finding:
+        """The same finding, with this severity if its own is greater."""
+        return replace(self, severity=min(self.severity, severity))
+
+    def about(self, what: str) -> Finding:
+        """The same finding about one camera or file, which both forms name first."""
+        return replace(self, words=f"{what}: {self.words}", short=f"{what}: {self.short}")
 
 
 def choices(names: Iterable[str]) -> str:

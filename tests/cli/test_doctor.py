@@ -13,7 +13,7 @@ import pytest
 
 from shadowpuppet.cli import app as cli
 from shadowpuppet.cli import doctor
-from shadowpuppet.cli.doctor import Finding, examine, works
+from shadowpuppet.cli.doctor import Examined, examine, works
 from shadowpuppet.errors import extra_command
 
 
@@ -30,7 +30,7 @@ def told(capsys, monkeypatch):
     return run
 
 
-def named(found: list[Finding]) -> dict[str, Finding]:
+def named(found: list[Examined]) -> dict[str, Examined]:
     return {finding.name: finding for finding in found}
 
 

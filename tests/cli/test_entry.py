@@ -31,7 +31,7 @@ main()
 
 
 @pytest.mark.parametrize(
-    "name", ["shadowpuppet.cli.app", "cyclopts", "numpy", "shadowpuppet.pipeline.options", "shadowpuppet.pipeline.survey.rig", "numba"]
+    "name", ["shadowpuppet.cli.app", "cyclopts", "numpy", "shadowpuppet.pipeline.options", "shadowpuppet.pipeline.findings.rig", "numba"]
 )
 def test_control_c_while_the_program_is_loaded_is_no_traceback(name):
     done = subprocess.run([sys.executable, "-c", INTERRUPTING.format(name=name)], capture_output=True, text=True, check=False)

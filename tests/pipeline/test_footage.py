@@ -12,9 +12,9 @@ from films import encoded, pictures
 from shadowpuppet.body.anthropometry import sizes_from_height
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.io.person import Person, write_person
+from shadowpuppet.pipeline.findings.cautions import film_cautions
 from shadowpuppet.pipeline.footage import Sample, open_footage, open_recording
 from shadowpuppet.pipeline.options import make_options
-from shadowpuppet.pipeline.survey.cautions import film_cautions
 
 
 @pytest.mark.parametrize(("times", "pace", "jitter"), [([0.0], np.nan, np.nan), ([1.0, 1.1], 0.1, 0.0), ([0, 0.1, 0.2, 0.5], 0.1, 0.0943)])

@@ -7,11 +7,13 @@ import pytest
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetWarning
-from shadowpuppet.pipeline.footage import open_footage
+from shadowpuppet.pipeline.findings.camera import survey_camera
+from shadowpuppet.pipeline.findings.film import films_again, look_again, survey_film
+from shadowpuppet.pipeline.footage import Footage, open_footage
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.progress import add_left_out, left_out_metrics, warn_of_left_out
-from shadowpuppet.pipeline.survey.film import survey_film
-from shadowpuppet.silhouette.added import BesideBody, SceneHint
+from shadowpuppet.pipeline.progress import Listener, Steps, add_left_out, left_out_metrics, warn_of_left_out
+from shadowpuppet.pipeline.rig import open_rig
+from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.synthetic import Obstacle, Scene, Spec, Viewpoint, synthesize
 from shadowpuppet.video import open_frames
 
@@ -50,7 +52,7 @@ def beside_cabinet(tmp_path_factory):
     return folder
 
 
-def test_what_the_body_leaves_unexplained_and_never_moves_belongs_to_the_scene(beside_cabinet):
+def test_what_the_body_leaves_unexplained_and_never_moves_belongs_to_the_scene(beside_cabinet, monkeypatch):
     options = Options()
     footage = open_footage(beside_cabinet, options)
     first = survey_film(footage, options)
@@ -58,11 +60,26 @@ def test_what_the_body_leaves_unexplained_and_never_moves_belongs_to_the_scene(b
     person = (exact if exact.ndim == 2 else exact[..., 0]) > 0.5
     thing = (np.mean(first.masks, axis=0) > 0.9) & ~(exact if exact.ndim == 2 else exact[..., 0]).astype(bool)
     assert thing.any()
-    again = survey_film(footage, options, hint=SceneHint(BesideBody(thing, person)))
+    with monkeypatch.context() as patched:
+        patched.setattr(Footage, "frames", lambda *_, **__: pytest.fail("the film is read again"))
+        again = look_again(footage, first, options, BesideBody(thing, person), Steps(None, ["cam"]))
     assert again.silhouettes.added is not None
     assert again.silhouettes.before is not None
     assert np.mean([mask[thing].mean() for mask in again.masks]) < 0.1
     assert np.mean([mask[person].mean() for mask in again.masks]) > 0.9
-    assert any("never moves" in said for said in again.values["left_out"])
-    kept = survey_film(footage, options, hint=SceneHint(None, again.silhouettes.added))
+    assert any("never moves" in said for said in again.look.left_out)
+    assert look_again(footage, again, options, None, Steps(None, ["cam"])) is again
+    kept = survey_film(footage, options, added=again.silhouettes.added)
     assert all((one == other).all() for one, other in zip(kept.masks, again.masks))
+
+
+def test_a_second_look_that_finds_nothing_more_examines_no_recording_again(beside_cabinet, monkeypatch):
+    """A kept survey has no films: they are examined anew, with what was added before."""
+    options = Options()
+    rig = open_rig(beside_cabinet, options)
+    survey = survey_camera(rig, options)
+    nothing = BesideBody(np.zeros((96, 128), bool), np.ones((96, 128), bool))
+    with monkeypatch.context() as patched:
+        patched.setattr(Footage, "frames", lambda *_, **__: pytest.fail("the film is read again"))
+        assert films_again(survey, options, [nothing], Listener()) is None
+    assert films_again(survey.settled(), options, [nothing], Listener()) is None

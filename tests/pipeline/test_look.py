@@ -13,18 +13,18 @@ from hypothesis import strategies as st
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import HARMFUL, NOTED, RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
 from shadowpuppet.io.recording import Subject
+from shadowpuppet.pipeline.findings.camera import _doubts as camera_doubts
+from shadowpuppet.pipeline.findings.camera import _look, survey_camera
+from shadowpuppet.pipeline.findings.cautions import recovery_cautions
+from shadowpuppet.pipeline.findings.film import quality_of, survey_film
 from shadowpuppet.pipeline.footage import FIRST, FIRST_SECONDS, LOOKED_AT, RUN, RUNS, _spread, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import DEEP, _doubts, _forearms_seen, wrong_posture
 from shadowpuppet.pipeline.prepare import MONOCULAR, Prepared, look_at, prepare
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes, read_masks
-from shadowpuppet.pipeline.survey.camera import _doubts as camera_doubts
-from shadowpuppet.pipeline.survey.camera import _look
-from shadowpuppet.pipeline.survey.cautions import recovery_cautions
-from shadowpuppet.pipeline.survey.film import quality_of, survey_film
 from shadowpuppet.pipeline.track import json_text, track_recording
-from shadowpuppet.silhouette import RecoveredScene
+from shadowpuppet.silhouette import RecoveredScene, Segmenter
 from shadowpuppet.silhouette.quality import mask_quality
 from shadowpuppet.synthetic import synthesize
 from shadowpuppet.synthetic.spec_changes import parse_gestures
@@ -68,6 +68,19 @@ def test_a_look_tells_whether_the_person_fits(look):
     assert look.person["start_overlap"] > 0.85
     assert look.person["distance"] == pytest.approx(2.0)
     assert set(look.person["sizes"]) == set(sizes_from_height(1.7).names())
+
+
+def test_each_sampled_frame_is_classified_once(recording, monkeypatch):
+    """However many look at it: the masks, the count of people, the first seconds."""
+    seen, labelled = [], Segmenter.labelled
+    monkeypatch.setattr(Segmenter, "labelled", lambda self, image: seen.append(image) or labelled(self, image))
+    survey = survey_camera(open_rig(recording, Options()), Options())
+    (film,) = survey.films
+    assert len(seen) < len(film.sample.frames) + len(film.sample.first)
+    assert all(sum(each is frame.image for each in seen) == 1 for frame in film.sample.frames)
+    assert not film.silhouettes.classified  # nothing is held any longer
+    first, (mask,) = film.sample.frames[0], survey.first.masks[0]
+    np.testing.assert_array_equal(film.silhouettes(first), mask)
 
 
 def test_a_look_is_plain(look):
@@ -195,7 +208,7 @@ def test_an_unknown_distance_before_a_camera_that_was_not_calibrated_is_no_good_
     footage = open_footage(recording, make_options({"height": 1.7}))
     footage = replace(footage, recording=replace(footage.recording, references=(), subject=Subject(height=1.7)))
     (doubt,) = [each for each in camera_doubts(replace(look, calibrated=calibrated), footage) if "distance" in each.short]
-    assert doubt.weight == weight
+    assert doubt.severity == weight
 
 
 def test_a_guessed_camera_is_said(recording, tmp_path):
@@ -212,7 +225,7 @@ def test_a_guessed_camera_is_said(recording, tmp_path):
 def test_a_head_that_never_moves_makes_a_recording_doubtful():
     scene = RecoveredScene(np.zeros((4, 4), np.uint8), np.ones((4, 4), bool), 60, head_still=True)
     (said, _) = recovery_cautions(["cam"], [Silhouettes("the film", None, recovered=scene)])
-    assert (said.weight, said.short) == (HARMFUL, "head never moves: film the empty scene")
+    assert (said.severity, said.short) == (HARMFUL, "head never moves: film the empty scene")
 
 
 def test_a_scene_taken_from_the_film_is_said(recording, tmp_path):
@@ -331,7 +344,7 @@ def test_arms_that_are_not_seen_and_trunks_that_are_too_deep_show_a_wrong_postur
 def seated_doubts(folder, motion, options=None):
     synthesize(replace(made.SPEC, motion=parse_gestures(motion)), folder, np.random.default_rng(3))
     survey = MONOCULAR.survey(open_rig(folder, options or Options()), options or Options())
-    return {doubt.short: doubt for doubt in survey.look.doubts}
+    return {doubt.short: doubt for doubt in survey.look.findings}
 
 
 def test_who_sits_down_later_is_told_from_who_bows(tmp_path):
@@ -342,7 +355,7 @@ def test_who_sits_down_later_is_told_from_who_bows(tmp_path):
 
 def test_feet_are_missed_only_where_legs_are_tracked(tmp_path):
     found = seated_doubts(tmp_path / "stands", "wave_hands 2", make_options({"body": "anatomical"}))
-    assert [(each.short, each.weight) for each in found.values()] == [("feet are cut off: step back, or tilt the camera", HARMFUL)]
+    assert [(each.short, each.severity) for each in found.values()] == [("feet are cut off: step back, or tilt the camera", HARMFUL)]
 
 
 # What is looked at
@@ -447,13 +460,13 @@ def found_without_references(overlaps: int, place: float) -> SizeFit:
 def test_a_distance_that_silhouettes_do_not_show_is_doubted():
     certain, uncertain = (_doubts(found_without_references(12, place), "proportions", 0.85, 12) for place in (0.8, 0.6))
     assert not certain
-    assert [doubt.startswith("at no distance a person who faces the camera") for doubt in uncertain] == [True]
+    assert [doubt.words.startswith("at no distance a person who faces the camera") for doubt in uncertain] == [True]
     assert not _doubts(found_without_references(12, np.nan), "proportions", 0.85, 12)
 
 
 def test_a_person_who_is_elsewhere_in_many_moments_is_doubted():
     (doubt,) = _doubts(found_without_references(8, 0.8), "proportions", 0.2, 12)
-    assert doubt.startswith("in 4 of 12 moments of the film the person is at another distance or height")
+    assert doubt.words.startswith("in 4 of 12 moments of the film the person is at another distance or height")
     assert not _doubts(found_without_references(10, 0.8), "proportions", 0.85, 12)
     known = replace(found_without_references(1, np.nan), overlaps={"front_t_pose": 0.9})
     assert not _doubts(known, "references", 0.85, 12)

@@ -20,15 +20,15 @@ from shadowpuppet.cli.app import run
 from shadowpuppet.errors import HARMFUL, NOTED, TrackingError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.pipeline.findings.look import FirstSeconds, RigLook
+from shadowpuppet.pipeline.findings.opening import opening_of
+from shadowpuppet.pipeline.findings.rig import _agreement_of_one, _rig_doubts, survey_rig
 from shadowpuppet.pipeline.footage import RUN, RUN_OF_SEVERAL, RUNS, RUNS_OF_SEVERAL, take_sample
-from shadowpuppet.pipeline.look import FirstSeconds, RigLook
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.prepare import MULTIVIEW, look_at, prepare
 from shadowpuppet.pipeline.progress import Listener, Steps, json_text
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
-from shadowpuppet.pipeline.survey.opening import opening_of
-from shadowpuppet.pipeline.survey.rig import _agreement_of_one, _rig_doubts, survey_rig
 from shadowpuppet.pipeline.track import track_recording
 
 MASKS = Options(masks=True)
@@ -151,20 +151,20 @@ def cut(look: RigLook, **shares: dict[str, float]) -> RigLook:
 def test_who_is_cut_off_in_one_picture_but_whole_in_three_others_is_no_doubt(recording):
     look = looked(recording)
     (one,) = [doubt for doubt in _rig_doubts(cut(look, cam2={"left": 0.3})) if "person is cut off" in doubt.short]
-    assert (one.short, one.weight) == ("camera 'cam2': person is cut off at the left: step back", NOTED)
+    assert (one.short, one.severity) == ("camera 'cam2': person is cut off at the left: step back", NOTED)
     both = [doubt for doubt in _rig_doubts(cut(look, cam2={"left": 0.3}, cam4={"top": 0.1})) if "person is cut off" in doubt.short]
-    assert [doubt.weight for doubt in both] == [HARMFUL, HARMFUL]
+    assert [doubt.severity for doubt in both] == [HARMFUL, HARMFUL]
 
 
 def test_feet_that_too_few_cameras_show_are_a_doubt(recording):
     look = looked(recording)
     assert not [doubt for doubt in _rig_doubts(look) if "feet" in doubt.short]
     (some,) = [doubt for doubt in _rig_doubts(cut(look, cam1={"bottom": 0.9}, cam2={"bottom": 0.2})) if "feet" in doubt.short]
-    assert (some.short, some.weight) == ("feet cut off in 'cam1' and 'cam2': step back or tilt", NOTED)
+    assert (some.short, some.severity) == ("feet cut off in 'cam1' and 'cam2': step back or tilt", NOTED)
     assert "camera 'cam1' in 90 % of the frames, camera 'cam2' in 20 %" in some
     three = {f"cam{n}": {"bottom": 0.6} for n in (1, 2, 3)}
     (most,) = [doubt for doubt in _rig_doubts(cut(look, **three)) if "feet" in doubt.short]
-    assert (most.short, most.weight) == ("feet cut off in 3 cameras: step back or tilt", HARMFUL)
+    assert (most.short, most.severity) == ("feet cut off in 3 cameras: step back or tilt", HARMFUL)
     assert not [doubt for doubt in _rig_doubts(cut(look, **three), several=True) if "feet" in doubt.short]
 
 
@@ -173,7 +173,7 @@ def test_films_of_other_rates_and_lengths_are_doubted(spoilt):
     made.write_film(spoilt / "video" / "cam2.mp4", frames[::2], made_rig.RATE / 2)
     for kind in ("masks", "background"):
         (spoilt / kind / "cam2.mkv").unlink(missing_ok=True)
-    (doubt,) = [d for d in looked(spoilt, Options()).doubts if "rates" in d]
+    (doubt,) = [d for d in looked(spoilt, Options()).findings if "rates" in d]
     assert "cam2 5" in doubt
     assert doubt.short == "camera 'cam2' is of another frame rate: film at one"
     made.write_film(spoilt / "video" / "cam2.mp4", frames[:15], made_rig.RATE)
@@ -200,9 +200,9 @@ def test_without_an_empty_scene_the_silhouettes_may_be_why_cameras_do_not_fit_to
         return replace(camera, T_camera_world=turn @ camera.T_camera_world)
 
     write_calibration(spoilt / "calibration.toml", list(map(turned, (5, -5, 9, -9), made_rig.cameras())))
-    assert "cameras and calibration do not fit: calibrate again" in {doubt.short for doubt in looked(spoilt).doubts}
+    assert "cameras and calibration do not fit: calibrate again" in {doubt.short for doubt in looked(spoilt).findings}
     shutil.rmtree(spoilt / "background")
-    said = {doubt.short for doubt in looked(spoilt, Options()).doubts}
+    said = {doubt.short for doubt in looked(spoilt, Options()).findings}
     assert "silhouettes do not fit together: film the empty scene, or calibrate" in said
 
 

@@ -15,7 +15,7 @@ from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
 
 def doubts(overlaps=None, place=0.9, source="proportions", start=0.9, moments=4):
     fit = SimpleNamespace(overlaps={f"m{n}": 0.9 for n in range(4)} if overlaps is None else overlaps, place_overlap=place)
-    return [(doubt.short.split(":")[0], doubt.weight) for doubt in _doubts(fit, source, start, moments)]
+    return [(doubt.short.split(":")[0], doubt.severity) for doubt in _doubts(fit, source, start, moments)]
 
 
 @pytest.mark.parametrize("name", DOUBTFUL)

@@ -21,10 +21,10 @@ from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline import person_rig
+from shadowpuppet.pipeline.findings.rig import survey_rig
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
-from shadowpuppet.pipeline.survey.rig import survey_rig
 from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.tracking.multiview.settings import for_smeared
 from shadowpuppet.tracking.multiview.size_estimation import Front
@@ -143,7 +143,7 @@ def test_an_estimated_height_is_doubted_where_the_body_fits_badly():
     assert person_rig._doubts(1.8, 0.85) == ()
     (said,) = person_rig._doubts(1.83, 0.72)
     assert "height, 1.83 m, may be off by 20 cm: the body overlaps the silhouettes by 0.72 only" in said
-    assert (said.short, said.weight) == ("height is uncertain: give --height", NOTED)
+    assert (said.short, said.severity) == ("height is uncertain: give --height", NOTED)
     assert len(said.short.split()) <= 10
 
 
@@ -153,7 +153,7 @@ def test_a_front_that_hardly_fits_better_is_doubted():
     (said,) = person_rig._front_doubts(Front(0.0, np.zeros(3), 0.012))
     assert "which way the person faces is uncertain" in said
     assert "about as well (1 % worse)" in said
-    assert said.weight == HARMFUL
+    assert said.severity == HARMFUL
     assert len(said.short.split()) <= 10
 
 

@@ -16,11 +16,11 @@ from shadowpuppet.io.checkpoint import FRAMES, STATE
 from shadowpuppet.io.files.lock import LOCK
 from shadowpuppet.io.run_writer import CompleteRun
 from shadowpuppet.pipeline import progress
-from shadowpuppet.pipeline import track as module
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.prepare import MONOCULAR, MULTIVIEW
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.rig import open_rig
+from shadowpuppet.pipeline.stages import write as module
 from shadowpuppet.pipeline.track import run
 from shadowpuppet.synthetic import Gesture, Ring, Scene, Spec, synthesize
 

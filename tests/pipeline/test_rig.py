@@ -14,11 +14,11 @@ from solids import looking
 
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, SilhouetteError
 from shadowpuppet.io.recording import Recording, View
+from shadowpuppet.pipeline.findings.opening import kept_sets
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, Opening, chosen_views, cut, spread_frames, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.repair.films import check_calibration
 from shadowpuppet.pipeline.rig import LATE, Rig, open_rig, read_frames, synchronized_frames
-from shadowpuppet.pipeline.survey.opening import kept_sets
 from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.video import write_frames
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from types import SimpleNamespace
 
 import made
 import numpy as np
@@ -59,10 +60,10 @@ def test_an_overlay_has_the_films_pictures(track, tmp_path):
 
 
 def test_a_film_that_was_replaced_between_two_runs_is_surveyed_again(spoilt):
-    cache, made_of = SilhouetteCache(), []
+    cache, made_of, made_survey = SilhouetteCache(), [], SimpleNamespace(settled=lambda: "a survey")
 
     def survey(**values) -> None:
-        cache.survey(open_rig(spoilt, make_options(values)), make_options(values), lambda rig, _: made_of.append(rig) or rig)
+        cache.survey(open_rig(spoilt, make_options(values)), make_options(values), lambda rig, _: made_of.append(rig) or made_survey)
 
     survey()
     survey()

@@ -87,7 +87,7 @@ def test_backward_the_arms_colours_are_known_from_the_start(recording, tmp_path,
         known.append((subject.colours, list(store)))
         return writer.motion
 
-    monkeypatch.setattr("shadowpuppet.pipeline.track._backward", backward)
+    monkeypatch.setattr("shadowpuppet.pipeline.track.backward", backward)
     track_recording(recording, tmp_path / "run", make_options(QUICK))
     ((colours, sets),) = known
     assert colours.rest.sum() > 0

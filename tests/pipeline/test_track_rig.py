@@ -73,7 +73,7 @@ def test_a_run_says_how_it_was_made(recording, whole):
     assert evaluate_run(whole.folder)["cost_m2"]["count"] == made_rig.FRAMES
     look = json.loads((whole.folder / "look.json").read_text())
     assert look["person"] == {"height": 1.7}
-    assert "the sizes are a guess" in look["doubts"]
+    assert "the sizes are a guess" in [finding["words"] for finding in look["findings"]]
     assert max(look["agreement"]["apart"]) < 1.5
     assert [camera.name for camera in read_calibration(whole.folder / "calibration.toml")] == info["cameras"]
 

@@ -58,7 +58,7 @@ def test_figures_stay_in_their_ranges(density, seed):
         assert 0 <= share <= 1
     for figure in (quality.flicker, quality.specks, quality.speck_area, quality.holes, quality.hole_area):
         assert figure >= 0
-    for sentence in (*quality.warnings(), quality.refusal() or ""):
+    for sentence in (*map(str, quality.warnings()), quality.refusal() or ""):
         assert "nan" not in sentence
 
 

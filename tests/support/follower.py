@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.errors import NOTED, Caution
+from shadowpuppet.errors import NOTED, Finding
 from shadowpuppet.io.person import Person
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.tracking.multiview.observation import BodyInViews
@@ -51,4 +51,4 @@ def followed(cameras) -> MultiviewSubject:
     sizes = average_sizes("anatomical", 1.7)
     body = make_body("anatomical", sizes)
     return MultiviewSubject(body=body, tracker=Follower(body, cameras), hull=VisualHull(cameras), person=Person(sizes),
-                            summary={"height": 1.7}, doubts=(Caution("the sizes are a guess", "sizes are a guess: give --person", NOTED),))
+                            summary={"height": 1.7}, doubts=(Finding("the sizes are a guess", "sizes are a guess: give --person", NOTED),))

@@ -13,7 +13,7 @@ from shadowpuppet.calibration.silhouette_coverage import pixels_beyond, triangul
 from shadowpuppet.calibration.silhouettes import Row, outlines_of, silhouettes_of
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.errors import HARMFUL, RUINOUS, Caution
+from shadowpuppet.errors import HARMFUL, RUINOUS, Finding
 from shadowpuppet.geometry import Array, evenly_spread, inverse, rigid
 from shadowpuppet.threads import MadeOnDemand
 
@@ -61,27 +61,29 @@ class Agreement:
         """Why tracking is hopeless, and the remedy; None if it is not."""
         return self.remedy if self.hopeless else None
 
-    def doubts(self) -> tuple[Caution, ...]:
+    def doubts(self) -> tuple[Finding, ...]:
         """A sentence on each camera that disagrees, with the remedy; none if there is a refusal."""
         if self.hopeless:
             return ()
         if self.remedy is not None:
-            return (Caution(self.remedy, "cameras and calibration do not fit: see `shadowpuppet check`", RUINOUS),)
+            return (Finding(self.remedy, "cameras and calibration do not fit: see `shadowpuppet check`", RUINOUS),)
         return tuple(self._disagreements())
 
-    def _disagreements(self) -> Iterator[Caution]:
+    def _disagreements(self) -> Iterator[Finding]:
         rest = {name: apart for name, apart in zip(self.names, self.apart) if name not in self.wrong}
         if self.wrong and len(rest) < 2:
             values = ", ".join(f"{name} {apart:.0f}" for name, apart in zip(self.names, self.apart) if apart is not None)
-            yield Caution(f"the cameras' silhouettes do not fit together (pixels apart: {values}; expected under {self.limit:.0f}): does "
+            yield Finding(f"the cameras' silhouettes do not fit together (pixels apart: {values}; expected under {self.limit:.0f}): does "
                           "the calibration belong to these films, and were they begun together? calibrate again, or say in [start] of "
-                          "recording.toml when each began", "cameras and calibration do not fit: calibrate again", RUINOUS)
+                          "recording.toml when each began", "cameras and calibration do not fit: calibrate again", RUINOUS,
+                          {name: apart for name, apart in zip(self.names, self.apart) if apart is not None})
             return
         good = max((apart for apart in rest.values() if apart is not None), default=0.0)
         for name in self.wrong:
-            yield Caution(f"camera {name!r} disagrees with the others by {self.apart[self.names.index(name)]:.0f} pixels, they with each "
-                          f"other by {good:.1f}: was it moved, or is the calibration another's? calibrate it again, or leave it out: "
-                          f"--camera {','.join(rest)}", f"camera {name!r} disagrees: leave it out, or calibrate again", HARMFUL)
+            yield Finding.of("camera {camera!r} disagrees with the others by {pixels:.0f} pixels, they with each other by {others:.1f}: "
+                             "was it moved, or is the calibration another's? calibrate it again, or leave it out: --camera {rest}",
+                             "camera {camera!r} disagrees: leave it out, or calibrate again", HARMFUL, camera=name,
+                             pixels=self.apart[self.names.index(name)] or 0.0, others=good, rest=",".join(rest))
 
 
 def agreement(cameras: Sequence[Camera], masks: Sequence[Sequence[Mask | None]], seconds: float = np.nan) -> Agreement:

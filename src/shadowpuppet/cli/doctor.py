@@ -43,7 +43,7 @@ REPAIR = "python -m pip install --force-reinstall shadowpuppet"
 
 
 @dataclass(frozen=True)
-class Finding:
+class Examined:
     """Result of one check."""
 
     name: str
@@ -84,7 +84,7 @@ def doctor(
     return 0 if works(found) else BROKEN
 
 
-def _tables(found: Sequence[Finding]) -> Iterator[Any]:
+def _tables(found: Sequence[Examined]) -> Iterator[Any]:
     """Table with a row per check and its remedy below, and the outcome in a sentence."""
     table = Table.grid(padding=(0, 2))
     table.add_column(no_wrap=True, style="bold")
@@ -101,9 +101,9 @@ def _tables(found: Sequence[Finding]) -> Iterator[Any]:
     yield Text(outcome, "bold red" if broken else "bold green")
 
 
-def examine() -> list[Finding]:
+def examine() -> list[Examined]:
     """Run all checks; one that raises an error is reported as broken."""
-    found = list[Finding]()
+    found = list[Examined]()
     for name, check, needed in CHECKS:
         try:
             with warnings.catch_warnings():
@@ -111,11 +111,11 @@ def examine() -> list[Finding]:
                 found += check()
         except Exception as error:
             info = f"{type(error).__name__}: {' '.join(str(error).split())}"
-            found.append(Finding(name, "broken", info[:300], REPAIR if needed else "", needed))
+            found.append(Examined(name, "broken", info[:300], REPAIR if needed else "", needed))
     return found
 
 
-def works(found: list[Finding]) -> bool:
+def works(found: list[Examined]) -> bool:
     """Whether tracking is possible."""
     return not any(finding.needed and finding.state != "works" for finding in found)
 
@@ -123,13 +123,13 @@ def works(found: list[Finding]) -> bool:
 # The core
 
 
-def _python() -> Iterator[Finding]:
+def _python() -> Iterator[Examined]:
     old = sys.version_info[:2] < OLDEST_PYTHON
-    yield Finding("Python", "broken" if old else "works", f"{platform.python_version()}, {platform.platform()}",
+    yield Examined("Python", "broken" if old else "works", f"{platform.python_version()}, {platform.platform()}",
                   f"install Python {OLDEST_PYTHON[0]}.{OLDEST_PYTHON[1]} or later" if old else "", True)  # fmt: skip
 
 
-def _libraries() -> Iterator[Finding]:
+def _libraries() -> Iterator[Examined]:
     info, bad = [], []
     for name in _required("shadowpuppet"):
         try:
@@ -138,9 +138,9 @@ def _libraries() -> Iterator[Finding]:
         except Exception as error:
             bad.append(f"{name}: {type(error).__name__}: {' '.join(str(error).split())}")
     if bad:
-        yield Finding("libraries", "broken", "; ".join(bad), REPAIR, True)
+        yield Examined("libraries", "broken", "; ".join(bad), REPAIR, True)
     else:
-        yield Finding("libraries", "works", ", ".join(info), needed=True)
+        yield Examined("libraries", "works", ", ".join(info), needed=True)
 
 
 def _required(name: str) -> list[str]:
@@ -148,7 +148,7 @@ def _required(name: str) -> list[str]:
     return [re.split(r"[^\w.-]", text, maxsplit=1)[0] for text in metadata.requires(name) or [] if "extra ==" not in text]
 
 
-def _kernels() -> Iterator[Finding]:
+def _kernels() -> Iterator[Examined]:
     """Check that a compiled kernel computes the joints of a body."""
     import numpy as np
 
@@ -157,26 +157,26 @@ def _kernels() -> Iterator[Finding]:
     body = make_body("rounded", average_sizes("rounded", 1.75))
     head = body.points(np.zeros((1, len(body.skeleton.dofs))), names=["head"])[0, 0]
     if not 0.3 < head[2] < 0.9:
-        yield Finding("kernels", "broken", f"compiled code puts the head {head[2]:.3f} m above the waist", REPAIR, True)
+        yield Examined("kernels", "broken", f"compiled code puts the head {head[2]:.3f} m above the waist", REPAIR, True)
     else:
-        yield Finding("kernels", "works", "compiled, and right", needed=True)
+        yield Examined("kernels", "works", "compiled, and right", needed=True)
 
 
-def _cache() -> Iterator[Finding]:
+def _cache() -> Iterator[Examined]:
     from shadowpuppet.body.forward_kinematics import place_all
 
     info = getattr(getattr(place_all, "_cache", None), "cache_path", "")
     if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
-        yield Finding("compiled code", "missing", "NUMBA_DISABLE_JIT is set: nothing is compiled, which is very slow",
+        yield Examined("compiled code", "missing", "NUMBA_DISABLE_JIT is set: nothing is compiled, which is very slow",
                       "unset NUMBA_DISABLE_JIT")  # fmt: skip
     elif not info or not _writable(Path(info)):
-        yield Finding("compiled code", "missing", f"cannot be kept{f' in {info}' if info else ''}: it is compiled again at every start, "
+        yield Examined("compiled code", "missing", f"cannot be kept{f' in {info}' if info else ''}: it is compiled again at every start, "
                       "which takes up to half a minute", "set NUMBA_CACHE_DIR to a folder of your own that can be written")  # fmt: skip
     else:
-        yield Finding("compiled code", "works", f"kept in {info}")
+        yield Examined("compiled code", "works", f"kept in {info}")
 
 
-def _films() -> Iterator[Finding]:
+def _films() -> Iterator[Examined]:
     """Check that films, lossy and lossless, can be written and read."""
     import numpy as np
 
@@ -190,19 +190,19 @@ def _films() -> Iterator[Finding]:
                     film.write(image)
             off = [int(np.abs(frame.image.astype(int) - image).max()) for frame, image in zip(open_frames(Path(folder, name)), images)]
             if len(off) != len(images) or max(off) > (0 if lossless else 12):
-                yield Finding("films", "broken", f"{name}: {len(off)} of {len(images)} frames came back, off by {max(off, default=0)}",
+                yield Examined("films", "broken", f"{name}: {len(off)} of {len(images)} frames came back, off by {max(off, default=0)}",
                               REPAIR, True)  # fmt: skip
                 return
-    yield Finding("films", "works", "H.264 and FFV1 are written and read", needed=True)
+    yield Examined("films", "works", "H.264 and FFV1 are written and read", needed=True)
 
 
-def _codecs() -> Iterator[Finding]:
+def _codecs() -> Iterator[Examined]:
     import av
 
     there = [name for name, codec in CODECS.items() if _has_codec(av, codec)]
     lacking = [name for name in CODECS if name not in there]
     info = f"{', '.join(there)} can be read" + (f"; not {', '.join(lacking)}" if lacking else "")
-    yield Finding("codecs", "missing" if lacking else "works", info, "turn such films into H.264 first" if lacking else "")
+    yield Examined("codecs", "missing" if lacking else "works", info, "turn such films into H.264 first" if lacking else "")
 
 
 def _has_codec(av: object, name: str) -> bool:
@@ -231,65 +231,65 @@ def _model() -> str:
     return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())
 
 
-def _processor() -> Iterator[Finding]:
+def _processor() -> Iterator[Examined]:
     from shadowpuppet.threads import THREADS_VARIABLE, thread_limit, usable_cores
 
     known = environment()
     info = f"{known['cpu']}; {usable_cores()} of {known['cores']} cores may be used; Numba sees {known['vectors']}"
     info += f"; {THREADS_VARIABLE} is {thread_limit()}" if thread_limit() is not None else ""
     slow = known["vectors"] in ("AVX", "none known") and platform.machine().lower() in ("x86_64", "amd64")
-    yield Finding("processor", "missing" if slow else "works", info, "all works, at half the speed or less" if slow else "")
+    yield Examined("processor", "missing" if slow else "works", info, "all works, at half the speed or less" if slow else "")
 
 
 # Extras and devices
 
 
-def _extras() -> Iterator[Finding]:
+def _extras() -> Iterator[Examined]:
     for extra, (names, purpose) in EXTRAS.items():
         try:
             for name in names:
                 import_module(name)
         except ImportError:
-            yield Finding(f"extra {extra}", "missing", f"{purpose}: not installed", extra_command(extra))
+            yield Examined(f"extra {extra}", "missing", f"{purpose}: not installed", extra_command(extra))
         except Exception as error:  # such as a missing system library
-            yield Finding(f"extra {extra}", "broken", f"{purpose}: {' '.join(str(error).split())[:200]}")
+            yield Examined(f"extra {extra}", "broken", f"{purpose}: {' '.join(str(error).split())[:200]}")
         else:
-            yield Finding(f"extra {extra}", "works", f"{purpose}: {', '.join(f'{name} {metadata.version(name)}' for name in names)}")
+            yield Examined(f"extra {extra}", "works", f"{purpose}: {', '.join(f'{name} {metadata.version(name)}' for name in names)}")
 
 
-def _external_masks() -> Iterator[Finding]:
+def _external_masks() -> Iterator[Examined]:
     """Check the program that runs the scripts of `masks`."""
     from shadowpuppet.silhouette.external.environment import cache_folder, uv_path
 
     uv = uv_path()
     told = f"scripts of `masks` are run by uv, {uv}" if uv else f"scripts of `masks` run in environments kept in {cache_folder()}"
-    yield Finding("masks", "works", told, "" if uv else "uv (pip install uv) would also bring the version of Python that a script needs")
+    yield Examined("masks", "works", told, "" if uv else "uv (pip install uv) would also bring the version of Python that a script needs")
 
 
-def _browser() -> Iterator[Finding]:
+def _browser() -> Iterator[Examined]:
     import shutil
 
     there = next((name for name in BROWSERS if shutil.which(name)), "")
     if there or platform.system() in ("Windows", "Darwin"):
-        yield Finding("browser", "works", there or "the system's own")
+        yield Examined("browser", "works", there or "the system's own")
     else:
-        yield Finding("browser", "missing", "none was found", "pages of `live` and reports can be opened on another machine")
+        yield Examined("browser", "missing", "none was found", "pages of `live` and reports can be opened on another machine")
 
 
-def _cameras() -> Iterator[Finding]:
+def _cameras() -> Iterator[Examined]:
     """Find the cameras that Linux lists; they are not opened, as their lights would go on."""
     if platform.system() != "Linux":
-        yield Finding("cameras", "works", "not looked for here; `live --camera 0` tries the first")
+        yield Examined("cameras", "works", "not looked for here; `live --camera 0` tries the first")
         return
     devices = sorted(Path("/dev").glob("video*"))
     shut = [device.name for device in devices if not os.access(device, os.R_OK | os.W_OK)]
     named = ", ".join(f"{device.name} ({_camera_name(device)})" for device in devices)
     if not devices:
-        yield Finding("cameras", "missing", "none is connected", "`live --camera FILM` or an address of the network will do")
+        yield Examined("cameras", "missing", "none is connected", "`live --camera FILM` or an address of the network will do")
     elif shut:
-        yield Finding("cameras", "broken", f"{', '.join(shut)} may not be opened", "add yourself to the group video, and log in again")
+        yield Examined("cameras", "broken", f"{', '.join(shut)} may not be opened", "add yourself to the group video, and log in again")
     else:
-        yield Finding("cameras", "works", named)
+        yield Examined("cameras", "works", named)
 
 
 def _camera_name(device: Path) -> str:
@@ -308,7 +308,7 @@ def _writable(folder: Path) -> bool:
         return False
 
 
-CHECKS: tuple[tuple[str, Callable[[], Iterator[Finding]], bool], ...] = (
+CHECKS: tuple[tuple[str, Callable[[], Iterator[Examined]], bool], ...] = (
     ("Python", _python, True), ("libraries", _libraries, True),
     ("kernels", _kernels, True), ("compiled code", _cache, False),
     ("films", _films, True), ("codecs", _codecs, False), ("processor", _processor, False), ("extras", _extras, False),

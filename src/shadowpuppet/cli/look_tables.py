@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 
 from shadowpuppet.cli.tables import pairs, seen_height, table
-from shadowpuppet.pipeline.look import CameraLook, Look, RigLook
+from shadowpuppet.pipeline.findings.look import CameraLook, Look, RigLook
 
 
 def look_table(look: Look | RigLook, everything: bool = True) -> RenderableType:

@@ -19,7 +19,7 @@ from shadowpuppet.errors import printable
 from shadowpuppet.output import say, say_text, without_controls
 
 if TYPE_CHECKING:
-    from shadowpuppet.pipeline.verdict.verdict import Verdict
+    from shadowpuppet.pipeline.findings.verdict import Verdict
 
 
 SENSES = {"uncertain": " (the outline fits badly)", "predicted": " (bridged or unseen)", "lost": " (nothing fits)",
@@ -116,7 +116,7 @@ def verdict_table(verdict: Verdict, title: str) -> RenderableType:
 
 def verdict_of(plain: Mapping[str, Any], title: str) -> RenderableType:
     """The table of a verdict as a run's metrics keep it."""
-    from shadowpuppet.pipeline.verdict.verdict import Verdict
+    from shadowpuppet.pipeline.findings.verdict import Verdict
 
     return verdict_table(Verdict(plain["word"], tuple(plain["reasons"])), title)
 

@@ -18,8 +18,8 @@ from shadowpuppet.cli.look_tables import look_table
 from shadowpuppet.cli.tables import PlainConsole, show, verdict_table
 from shadowpuppet.errors import ShadowPuppetWarning, printable
 from shadowpuppet.live.display.view import LiveListener
-from shadowpuppet.pipeline.look import Look, RigLook
-from shadowpuppet.pipeline.verdict.verdict import verdict_of_look
+from shadowpuppet.pipeline.findings.look import Look, RigLook
+from shadowpuppet.pipeline.findings.verdict import verdict_of_look
 
 LOG_EVERY = 2.0
 """Seconds between lines of progress where there is no terminal."""

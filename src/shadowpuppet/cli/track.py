@@ -63,8 +63,8 @@ def track(recording: RecordingPath, /, *, folder: Annotated[Path | None, output(
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.io.run import read_run
     from shadowpuppet.io.run_writer import CompleteRun
+    from shadowpuppet.pipeline.findings.verdict import MOSTLY_LOST, lost_share
     from shadowpuppet.pipeline.track import track_recording
-    from shadowpuppet.pipeline.verdict.of_run import MOSTLY_LOST, lost_share
 
     options = options_from(flags, config)
     folder = folder or Path(f"run-{recording.resolve().name.removesuffix(recording.suffix if recording.is_file() else '')}")
@@ -101,7 +101,7 @@ def _show_project(recording: Path, folder: Path) -> None:
 
 def _people_done(folder: Path, metrics: Mapping[str, Any], quiet: bool) -> int:
     """Print the people of a run and its files; returns the exit code."""
-    from shadowpuppet.pipeline.verdict.of_run import MOSTLY_LOST
+    from shadowpuppet.pipeline.findings.verdict import MOSTLY_LOST
 
     def is_lost(status: Mapping[str, int], frames: int) -> bool:
         return status.get("lost", 0) > MOSTLY_LOST * (frames - status.get("absent", 0))

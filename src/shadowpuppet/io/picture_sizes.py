@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shadowpuppet.errors import RecordingError, warn
@@ -17,15 +17,28 @@ BLOCK, MAX_PADDING = 16, 0.05
 """Pixels to a side of H.264's blocks, and the largest share of a picture's side by which they may exceed it to be taken for padding."""
 
 
-def without_padding(view: View) -> View:
+def fitting(view: View) -> View:
     """The view, its camera of the film's size if the two differ by the padding of H.264 alone, with a warning.
 
-    H.264 codes blocks of 16 pixels, and some programs show the rows and columns that fill the last ones: 1088 rows of 1080. They are added
-    at the bottom and the right, so that the other pixels and the camera's matrix stay. Live cameras are not opened.
+    Each source is opened once, live cameras are not. Raises `RecordingError` if pictures do not have their camera's size, which an empty
+    scene and masks may have without the film's padding, or with it.
     """
-    if camera_number(view.video) is not None:
-        return view
-    found, expected = open_frames(view.video).size, view.camera.size
+    found = None if camera_number(view.video) is not None else open_frames(view.video).size
+    view = view if found is None else _without_padding(view, found)
+    for source in (view.video, view.background, view.masks):
+        if source is not None and camera_number(source) is None:
+            size = found if found is not None and source is view.video else open_frames(source).size
+            _check_size(source, size, view)
+    return view
+
+
+def _without_padding(view: View, found: tuple[int, int]) -> View:
+    """The view of a film whose pictures have a size.
+
+    H.264 codes blocks of 16 pixels, and some programs show the rows and columns that fill the last ones: 1088 rows of 1080. They are added
+    at the bottom and the right, so that the other pixels and the camera's matrix stay.
+    """
+    expected = view.camera.size
     if found == expected or not differ_by_padding(found, expected):
         return view
     which = ("film", "calibration") if sum(found) > sum(expected) else ("calibration", "film")
@@ -45,18 +58,12 @@ def _is_padded(size: int, bare: int) -> bool:
     return size == bare or (size == -(-bare // BLOCK) * BLOCK and size - bare < MAX_PADDING * bare)
 
 
-def check_sizes(views: Iterable[View]) -> None:
-    """Raise `RecordingError` if pictures do not have their camera's size, which an empty scene and masks may have without the film's
-    padding, or with it; live cameras are not opened."""
-    for view in views:
-        for source in (view.video, view.background, view.masks):
-            if source is None or camera_number(source) is not None:
-                continue
-            found, (width, height) = open_frames(source).size, view.camera.size
-            if found != (width, height) and not (source is not view.video and differ_by_padding(found, (width, height))):
-                raise RecordingError(f"{source}: found pictures of {found[0]} x {found[1]} pixels, the calibration of camera "
-                                     f"{view.camera.name!r} is for {width} x {height}; "
-                                     + _remedy(found, (width, height), source is view.video))
+def _check_size(source: Path | str | int, found: tuple[int, int], view: View) -> None:
+    width, height = view.camera.size
+    if found != (width, height) and not (source is not view.video and differ_by_padding(found, (width, height))):
+        raise RecordingError(f"{source}: found pictures of {found[0]} x {found[1]} pixels, the calibration of camera "
+                             f"{view.camera.name!r} is for {width} x {height}; "
+                             + _remedy(found, (width, height), source is view.video))
 
 
 def _remedy(found: tuple[int, int], expected: tuple[int, int], is_film: bool) -> str:

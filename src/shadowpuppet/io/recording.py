@@ -14,7 +14,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, choices, reason, typed, warn
 from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, read_calibration
 from shadowpuppet.io.calibration.formats import find_calibration
-from shadowpuppet.io.picture_sizes import check_sizes, without_padding
+from shadowpuppet.io.picture_sizes import fitting
 from shadowpuppet.io.projects import Project, films_in, find_project, sources_in
 from shadowpuppet.io.recording_toml import RecordingNotes
 from shadowpuppet.names import composed, spelled_as
@@ -137,8 +137,7 @@ def read_recording(path: str | Path | int, *, fov: float | None = None, calibrat
     if not named:
         raise RecordingError(f"{calibration}: found no camera {folder.stem!r}, after the film's name; cameras there: "
                              f"{choices(c.name for c in cameras)}")
-    view = without_padding(View(named[0], source))
-    check_sizes([view])
+    view = fitting(View(named[0], source))
     return Recording(folder, folder.stem, (view,))
 
 
@@ -208,9 +207,8 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
         instead = f" ({choices(pictures)} there: found a picture, expected a film)" if pictures else ""
         warn(f"{folder}: no film of {choices(missing)}{instead}; going on with {choices(films)}")
     starts = _starts(notes, cameras, asked)
-    views = tuple(without_padding(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), starts.get(c.name, 0.0)))
+    views = tuple(fitting(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), starts.get(c.name, 0.0)))
                   for c in cameras if c.name in films)
-    check_sizes(views)
     truth = notes.file("truth") or _first(folder, "truth", ["csv", "trc"])
     training = notes.file("training") or _first(folder, "training", ["csv", "trc", "c3d", "bvh", "amc"])
     rate = notes.number("rate", RATES, "frames/s")

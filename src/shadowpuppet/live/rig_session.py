@@ -22,13 +22,13 @@ from shadowpuppet.live.rig_capture import SnapshotSet
 from shadowpuppet.live.session import COUNTDOWN, FIRST_REFINED, LAST_REFINED
 from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.motion import BLANK, MotionFrame
+from shadowpuppet.pipeline.findings.opening import OPENED, OPENING
 from shadowpuppet.pipeline.footage import CameraFrame, worked_size
 from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.person_rig import HullObservation, MultiviewSubject, check_body, fit_in_views
 from shadowpuppet.pipeline.rig import FrameSet, Segment, shown_in
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body
-from shadowpuppet.pipeline.survey.opening import OPENED, OPENING
 from shadowpuppet.tracking.doubt.multiview import Before
 from shadowpuppet.tracking.frozen import LEAST
 from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows

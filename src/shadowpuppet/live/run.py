@@ -33,8 +33,8 @@ from shadowpuppet.live.warm_up import warm_up
 from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.pipeline.options import Options, plain_options
+from shadowpuppet.pipeline.stages.smooth import smooth_run
 from shadowpuppet.pipeline.subject import FittedPerson, average_body, joint_names
-from shadowpuppet.pipeline.track import smooth_run
 from shadowpuppet.settings import validate
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.video.capture import CameraCapture

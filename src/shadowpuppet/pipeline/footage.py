@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +74,7 @@ class Footage:
         """How the ready silhouettes are written. Raises `SilhouetteError` or `VideoError`."""
         return MaskKind() if self.view.masks is None else mask_kind(self.view.masks, self.label)
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         """What another process needs, which opens the film itself."""
         return {name: value for name, value in self.__dict__.items() if name != "film"}
 

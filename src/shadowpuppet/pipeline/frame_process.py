@@ -103,9 +103,10 @@ def frames_beside(task: Task) -> Generator[FrameSet]:
 
 def _received(packed: bytes) -> Generator[FrameSet]:
     """The frame sets that another process makes of a packed task."""
-    apart: dict[str, Any] = {"creationflags": 0x200} if os.name == "nt" else {"process_group": 0}  # Ctrl-C is for this process alone
+    windows = os.name == "nt"  # Ctrl-C is for this process alone
     process = subprocess.Popen([sys.executable, "-P", "-c", f"from {__name__} import main; main()"], env=child_environment({}),
-                               stdin=subprocess.PIPE, stdout=subprocess.PIPE, **apart)
+                               stdin=subprocess.PIPE, stdout=subprocess.PIPE, creationflags=0x200 if windows else 0,
+                               process_group=None if windows else 0)
     messages, ended = queue.Queue[_Message](AHEAD), threading.Event()
     thread = threading.Thread(target=_converse, args=(process, packed, messages, ended), name="frames", daemon=True)
     thread.start()

@@ -53,7 +53,7 @@ def _corners(value: object) -> object:
 def _metres(limits: tuple[float, float]) -> WrapValidator:
     """A validator of lengths; its error states the limits in metres."""
 
-    def check(value: Any, handler: Callable[[Any], Any]) -> Any:
+    def check(value: object, handler: Callable[[object], object]) -> object:
         try:
             return handler(value)
         except ValidationError:
@@ -212,7 +212,7 @@ def options_text(options: Options) -> str:
     return "\n".join(_lines(options, ""))
 
 
-def _toml(value: Any) -> str:
+def _toml(value: object) -> str:
     """A value as TOML, on one line."""
     import tomli_w
 

@@ -17,14 +17,14 @@ from shadowpuppet.camera.colour_codes import ColourCode
 from shadowpuppet.camera.drawing import overlay_frame
 from shadowpuppet.camera.mask import Mask, Seen, may_be_person
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution, RecordingError, SilhouetteError, TrackingError
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Finding, RecordingError, SilhouetteError, TrackingError
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
 from shadowpuppet.motion.limbs import status_in_words
 from shadowpuppet.motion.motion import Motion, MotionFrame
+from shadowpuppet.pipeline.findings.look import Look, Survey
 from shadowpuppet.pipeline.footage import CameraFrame, Footage
-from shadowpuppet.pipeline.look import Look, Survey
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import FALLBACK_RATE
 from shadowpuppet.pipeline.rig import FrameSet
@@ -214,30 +214,32 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
     return replace(subject, summary=summary, doubts=tuple(_doubts(fit, source, start, len(moments))), beside=(beside,))
 
 
-def _doubts(fit: SizeFit, source: str, start: float, moments: int) -> list[Caution]:
+def _doubts(fit: SizeFit, source: str, start: float, moments: int) -> list[Finding]:
     """Doubts about a fit, a sentence each; `start`: overlap of the body, in the best pose found, with the film's first silhouette;
     `moments`: number of silhouettes that the person was looked for in."""
-    doubts = [Caution(f"references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
-                      "is the silhouette whole? take it again, or remove it", f"reference {name} does not fit: take it again", NOTED)
+    doubts = [Finding.of("references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
+                         "is the silhouette whole? take it again, or remove it", "reference {name} does not fit: take it again", NOTED,
+                         name=name, overlap=overlap)
               for name, overlap in fit.overlaps.items() if source == "references" and overlap < DOUBTFUL[name]]
     if fit.place_overlap < UNCERTAIN_OVERLAP:
-        doubts.append(Caution("at no distance a person who faces the camera overlaps the silhouettes by more than "
-                              f"{fit.place_overlap:.2f}: turned, or hidden in part, they may be a quarter nearer or farther; measure the "
-                              "distance and give --distance",
-                              "distance uncertain: measure it, give --distance", HARMFUL))
+        doubts.append(Finding.of("at no distance a person who faces the camera overlaps the silhouettes by more than {overlap:.2f}: "
+                                 "turned, or hidden in part, they may be a quarter nearer or farther; measure the distance and give "
+                                 "--distance",
+                                 "distance uncertain: measure it, give --distance", HARMFUL, overlap=fit.place_overlap))
     apart = 0 if source == "references" else moments - len(fit.overlaps)
     if apart >= ELSEWHERE * moments:
-        doubts.append(Caution(f"in {apart} of {moments} moments of the film the person is at another distance or height than in most: they "
-                              "walk, or sit down; an upper body stays where it was measured, a whole one can sit down (--body anatomical); "
-                              "cut the film with --start and --end", "person changes place: cut with --start, --end", HARMFUL))
+        doubts.append(Finding.of("in {apart} of {moments} moments of the film the person is at another distance or height than in most: "
+                                 "they walk, or sit down; an upper body stays where it was measured, a whole one can sit down (--body "
+                                 "anatomical); cut the film with --start and --end", "person changes place: cut with --start, --end",
+                                 HARMFUL, apart=apart, moments=moments))
     elif start < NOBODY:
-        doubts.append(Caution(f"the body overlaps the film's first silhouette by {start:.2f} only: is anybody in the picture then, and "
-                              "does the distance hold? begin where the whole person is seen (--start), give --distance",
-                              "no person fits the first silhouette: give --start or --distance", RUINOUS))
+        doubts.append(Finding.of("the body overlaps the film's first silhouette by {overlap:.2f} only: is anybody in the picture then, and "
+                                 "does the distance hold? begin where the whole person is seen (--start), give --distance",
+                                 "no person fits the first silhouette: give --start or --distance", RUINOUS, overlap=start))
     elif start < POOR:
-        doubts.append(Caution(f"the body overlaps the film's first silhouette by {start:.2f} only: do height and distance hold, is the "
-                              "silhouette a person's, and does the person face the camera?",
-                              "body fits the first silhouette badly: check height and distance", HARMFUL))
+        doubts.append(Finding.of("the body overlaps the film's first silhouette by {overlap:.2f} only: do height and distance hold, is the "
+                                 "silhouette a person's, and does the person face the camera?",
+                                 "body fits the first silhouette badly: check height and distance", HARMFUL, overlap=start))
     return doubts
 
 

@@ -7,7 +7,7 @@ from collections.abc import Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,12 +18,12 @@ from shadowpuppet.camera.bits import Bits
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, Seen, may_be_person
 from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.errors import HARMFUL, NOTED, Caution, SettingsError, choices
+from shadowpuppet.errors import HARMFUL, NOTED, Finding, SettingsError, choices
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.motion.motion import BLANK, JointTable, MotionFrame
+from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.learn_prior import familiar
-from shadowpuppet.pipeline.look import Survey
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.rig import FrameSet
@@ -165,8 +165,9 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
     person = estimate_sizes(rng, partial(make_body, settings.body), sizes, spread, cameras, first, settings, library,
                             len(first) // 2 if settings.patience else 0, shared, begin, both_fronts)
     prior = known.prior if settings.method == "hybrid" else None
-    summary: dict[str, Any] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual, "frames": person.frames,
-                               "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
+    summary: dict[str, object] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual,
+                                  "frames": person.frames,
+                                  "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
     tracker = MultiviewTracker(person.body, tuple(cameras), for_rate(settings, rate), prior, library,
                                looks=looks_in(settings.patience, rate), carve=hull.points if settings.odd_camera else None)
     return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull, tracker=tracker,
@@ -176,23 +177,23 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
                                          for each, picture, camera in zip(person.unexplained, tracker.views.pictures, cameras)))
 
 
-def _front_doubts(front: Front | None) -> tuple[Caution, ...]:
+def _front_doubts(front: Front | None) -> tuple[Finding, ...]:
     """Doubts about which way the person faces."""
     if front is None or front.lead >= SURE_FRONT:
         return ()
-    return (Caution("which way the person faces is uncertain: facing the other way a body fits the silhouettes about as well "
-                    f"({100 * front.lead:.0f} % worse); look at it (--overlay), and if it is turned round, let the film begin with a walk "
-                    "or raised arms (--start), or add a camera at the side",
-                    "front may be back: look; begin with a walk (--start)", HARMFUL),)
+    return (Finding.of("which way the person faces is uncertain: facing the other way a body fits the silhouettes about as well "
+                       "({percent:.0f} % worse); look at it (--overlay), and if it is turned round, let the film begin with a walk "
+                       "or raised arms (--start), or add a camera at the side",
+                       "front may be back: look; begin with a walk (--start)", HARMFUL, percent=100 * front.lead),)
 
 
-def _doubts(height: float, overlap: float) -> tuple[Caution, ...]:
+def _doubts(height: float, overlap: float) -> tuple[Finding, ...]:
     """Doubts about an estimated height, metres, of a body that overlaps the silhouettes by `overlap`."""
     if overlap >= SURE_OVERLAP:
         return ()
-    return (Caution(f"the person's height, {height:.2f} m, may be off by 20 cm: the body overlaps the silhouettes by {overlap:.2f} only; "
-                    "furniture before the person, or a chair that is not in the empty scene, does that; --height gives the height",
-                    "height is uncertain: give --height", NOTED),)
+    return (Finding.of("the person's height, {height:.2f} m, may be off by 20 cm: the body overlaps the silhouettes by {overlap:.2f} only; "
+                       "furniture before the person, or a chair that is not in the empty scene, does that; --height gives the height",
+                       "height is uncertain: give --height", NOTED, height=height, overlap=overlap),)
 
 
 def average_person(rng: np.random.Generator, cameras: Sequence[Camera], options: Options, rate: float, height: float) -> MultiviewSubject:
@@ -203,7 +204,7 @@ def average_person(rng: np.random.Generator, cameras: Sequence[Camera], options:
 
 
 def known_person(rng: np.random.Generator, cameras: Sequence[Camera], options: Options, rate: float, person: Person,
-                 summary: dict[str, Any], is_measured: bool) -> MultiviewSubject:
+                 summary: dict[str, object], is_measured: bool) -> MultiviewSubject:
     """A person of known sizes, without training motion, as `fit_in_views` makes one; `summary`: how they were found."""
     settings = options.multiview
     known, hull = familiar(rng, options, None, settings.body, rate), VisualHull(cameras, settings.hull)

@@ -10,18 +10,21 @@ from typing import Generic, NamedTuple
 import numpy as np
 
 from shadowpuppet.errors import TrackingError
-from shadowpuppet.io.person import write_person
-from shadowpuppet.pipeline.look import Look, RigLook, Survey
-from shadowpuppet.pipeline.options import Options
+from shadowpuppet.io.inputs.inputs import Resuming
+from shadowpuppet.io.person import read_person, write_person
+from shadowpuppet.io.prior import read_prior
+from shadowpuppet.io.run_writer import RunWriter
+from shadowpuppet.pipeline.findings.camera import survey_camera
+from shadowpuppet.pipeline.findings.film import films_again
+from shadowpuppet.pipeline.findings.look import Look, RigLook, Survey
+from shadowpuppet.pipeline.findings.rig import survey_rig
+from shadowpuppet.pipeline.options import Options, check_used, plain_options
 from shadowpuppet.pipeline.person import fit_monocular
 from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.progress import STAGES, Listener, generators
 from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
-from shadowpuppet.pipeline.subject import Before, FittedPerson, Observation, State, TrackedSubject
-from shadowpuppet.pipeline.survey.camera import survey_camera
-from shadowpuppet.pipeline.survey.rig import survey_rig
-from shadowpuppet.silhouette.added import SceneHint
+from shadowpuppet.pipeline.subject import Before, FittedPerson, Observation, State, TrackedSubject, average_body, joint_names
 from shadowpuppet.threads import one_blas_thread
 
 LOOKS_AGAIN = 3
@@ -36,7 +39,7 @@ class Kind(NamedTuple, Generic[State, Observation, Before]):
     settings: str
     """Name of the field of `Options` with the tracker's settings."""
     survey: Callable[..., Survey]
-    """Examines a rig with options and, after a first fit, with a `SceneHint` for each camera."""
+    """Examines a rig with options, for a listener, and after a first fit with films that were examined again."""
     fit: Callable[[np.random.Generator, Survey, Options], TrackedSubject[State, Observation, Before]]
     """Measures the person and makes the tracker."""
     stages: tuple[str, ...]
@@ -92,6 +95,25 @@ def fit_person(recording: str | Path, file: str | Path, options: Options | None 
     return subject, prepared.look
 
 
+def check_options(options: Options, rig: Rig) -> None:
+    """Raise `SettingsError` for options that have no effect on a rig, `FormatError` for a person or a prior that cannot be read, before the
+    recording is examined."""
+    check_used(options, rig.is_multiview)
+    if options.person is not None:
+        read_person(options.person, (options.multiview if rig.is_multiview else options.tracker).body)
+    if options.prior is not None and rig.is_multiview:
+        read_prior(options.prior)
+
+
+def run_writer(rig: Rig, kind: Kind[State, Observation, Before], folder: str | Path, options: Options, resume: bool) -> RunWriter:
+    """The writer of a run's folder; `resume`: an earlier run there goes on."""
+    body, recording = average_body(getattr(options, kind.settings).body), rig.recording
+    info = {"recording": recording.path.resolve(), "method": kind.name(options.preset, len(rig.cameras)),
+            "cameras": list(rig.names) if rig.is_multiview else None, "settings": plain_options(options),
+            "truth": recording.truth and recording.truth.resolve(), "begin": recording.begin or None, "end": recording.duration}
+    return RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, Resuming(resume, rig.inputs))
+
+
 def look_around(rig: Rig, options: Options, kind: Kind[State, Observation, Before], cache: SilhouetteCache | None = None,
                 listener: Listener | None = None) -> Survey:
     """Survey a recording. Raises a `ShadowPuppetError` if something cannot be used."""
@@ -109,7 +131,7 @@ def fit_survey(rng: np.random.Generator, survey: Survey, options: Options, kind:
                cache: SilhouetteCache | None, listener: Listener) -> Prepared[State, Observation, Before]:
     """The surveyed recording and the person in it."""
     if survey.look.refusal is not None and not options.anyway:
-        return Prepared(survey, None, survey.look)
+        return Prepared(survey.settled(), None, survey.look)
     listener.begin("measuring the person")
     try:
         subject = kind.fit(rng, survey, options)
@@ -124,7 +146,7 @@ def fit_survey(rng: np.random.Generator, survey: Survey, options: Options, kind:
         survey, subject = again, kind.fit(rng, again, options)
         if cache is not None:
             cache.keep(survey)
-    return Prepared(survey, subject, survey.look_with(subject.summary, subject.doubts))
+    return Prepared(survey.settled(), subject, survey.look_with(subject.summary, subject.doubts))
 
 
 def _looked_again(survey: Survey, subject: FittedPerson, options: Options, kind: Kind[State, Observation, Before],
@@ -132,7 +154,6 @@ def _looked_again(survey: Survey, subject: FittedPerson, options: Options, kind:
     """The survey in which what never moves, and the fitted body leaves unexplained, belongs to the scene; None if there is nothing."""
     if all(each is None for each in subject.beside):
         return None
-    hints = tuple(SceneHint(beside, each.added) for beside, each in zip(subject.beside, survey.silhouettes, strict=True))
-    again = kind.survey(survey.rig, options, hints, listener)
-    more = any(new.added is not old.added for new, old in zip(again.silhouettes, survey.silhouettes))
-    return again if more and again.look.refusal is None else None
+    films = films_again(survey, options, subject.beside, listener)
+    again = None if films is None else kind.survey(survey.rig, options, listener, films)
+    return again if again is not None and again.look.refusal is None else None

@@ -6,10 +6,10 @@ import contextlib
 import json
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypedDict, TypeVar
 
 import numpy as np
 
@@ -21,11 +21,15 @@ from shadowpuppet.io.files.plain import json_text
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.motion_files import check_unit, read_truth
 from shadowpuppet.io.person import Person, write_person
+from shadowpuppet.io.run import read_run
+from shadowpuppet.io.run_writer import RunWriter
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.motion.motion import Motion
-from shadowpuppet.pipeline.look import Look, RigLook
+from shadowpuppet.pipeline.findings.look import Look, RigLook
+from shadowpuppet.pipeline.findings.verdict import SetAside, verdict_of_run
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.pipeline.subject import floor_entry
 from shadowpuppet.tracking.frozen import Interval
 
 Item = TypeVar("Item")
@@ -152,6 +156,17 @@ class LeftOut(NamedTuple):
     """Pixels (H, W) that are left out in any of the frames, in a mask of any size."""
 
 
+class LeftOutEntry(TypedDict):
+    """What was left out of one camera's silhouettes, in metrics.json."""
+
+    camera: str
+    frames: int
+    from_s: float
+    to_s: float
+    box: list[int]
+    """Left, top, right and bottom, the film's pixels."""
+
+
 def add_left_out(before: Sequence[LeftOut | None], time: float, masks: Sequence[Mask | None]) -> tuple[LeftOut | None, ...]:
     """What is left out, by camera, with one more frame: its time (s), and for each camera the pixels (H, W) that are left out, or None;
     no masks for none. `before`: at first empty."""
@@ -163,11 +178,12 @@ def add_left_out(before: Sequence[LeftOut | None], time: float, masks: Sequence[
     return tuple(found) or tuple(before)
 
 
-def left_out_metrics(found: Sequence[LeftOut | None], cameras: Sequence[Camera]) -> dict[str, Any]:
+def left_out_metrics(found: Sequence[LeftOut | None], cameras: Sequence[Camera]) -> dict[str, list[LeftOutEntry]]:
     """The entry `left_out` of metrics.json, none if nothing was left out: for each camera, of the films' size, the number of frames, the
     times of the first and the last, seconds, and left, top, right and bottom of the place, the film's pixels."""
-    entries = [{"camera": camera.name, "frames": each.frames, "from_s": round(each.first, 3), "to_s": round(each.last, 3),
-                "box": _box(each.where, camera.size)} for camera, each in zip(cameras, found) if each is not None]
+    entries: list[LeftOutEntry] = [
+        {"camera": camera.name, "frames": each.frames, "from_s": round(each.first, 3), "to_s": round(each.last, 3),
+         "box": _box(each.where, camera.size)} for camera, each in zip(cameras, found) if each is not None]  # fmt: skip
     return {"left_out": entries} if entries else {}
 
 
@@ -191,7 +207,7 @@ def is_same_look(before: str, now: str) -> bool:
     one, other = json.loads(before), json.loads(now)
     places = str(one.pop("recording", "")), str(other.pop("recording", ""))
 
-    def equal(a: Any, b: Any) -> bool:
+    def equal(a: object, b: object) -> bool:
         if isinstance(a, dict) and isinstance(b, dict):
             return a.keys() == b.keys() and all(equal(a[key], b[key]) for key in a)
         if isinstance(a, list) and isinstance(b, list):
@@ -211,7 +227,7 @@ def tracked(frames: int | None, every: int) -> int | None:
     return None if frames is None else -(-frames // every)
 
 
-def timings(timer: StageTimer, stages: Iterable[str], frames: int, wall: float) -> dict[str, Any]:
+def timings(timer: StageTimer, stages: Iterable[str], frames: int, wall: float) -> dict[str, float | dict[str, float]]:
     """Seconds in total, frames/s, and milliseconds per frame of the `stages`, for metrics.json."""
     milliseconds = {stage: round(1000 * timer.seconds[stage] / max(frames, 1), 3) for stage in stages}
     return {"track_s": round(wall, 3), "frames_per_s": round(frames / max(wall, 1e-9), 2), "ms_per_frame": milliseconds}
@@ -226,7 +242,7 @@ def warn_of_losses(motion: Motion) -> None:
              "silhouettes show them, and them alone? --overlay shows it; give a picture of the empty scene, a --region, or better light")
 
 
-def warn_of_left_out(found: Sequence[Mapping[str, Any]]) -> None:
+def warn_of_left_out(found: Sequence[LeftOutEntry]) -> None:
     """Warn of parts of the silhouettes that were left out; `found`: the entry of metrics.json."""
     if found:
         places = "; ".join(f"camera {one['camera']!r}, {one['frames']} frames from {one['from_s']:.1f} to {one['to_s']:.1f} s, within "
@@ -235,14 +251,14 @@ def warn_of_left_out(found: Sequence[Mapping[str, Any]]) -> None:
              "another person; if it was the person, give --tracker.patience 0 (with several cameras --multiview.patience 0)")
 
 
-def set_aside(intervals: Iterable[Interval], names: Sequence[str]) -> dict[str, Any]:
+def set_aside(intervals: Iterable[Interval], names: Sequence[str]) -> dict[str, list[SetAside]]:
     """The entry `set_aside` of metrics.json, none if no camera was: camera, why, number of frames, times of the first and last (s)."""
-    found = [{"camera": names[each.camera], "why": each.why, "frames": each.frames, "from_s": round(each.begin, 3),
+    found: list[SetAside] = [{"camera": names[each.camera], "why": each.why, "frames": each.frames, "from_s": round(each.begin, 3),
               "to_s": round(each.end, 3)} for each in sorted(intervals, key=lambda each: each.begin)]
     return {"set_aside": found} if found else {}
 
 
-def warn_of_set_aside(found: Sequence[Mapping[str, Any]]) -> None:
+def warn_of_set_aside(found: Sequence[SetAside]) -> None:
     """Warn of cameras that were set aside, or of the only one that was blind; `found`: the entry of metrics.json."""
     if found:
         when = "; ".join(f"camera {one['camera']!r}, {one['why']} from {one['from_s']:.1f} to {one['to_s']:.1f} s" for one in found)
@@ -264,3 +280,23 @@ def evaluated(rig: Rig, motion: Motion) -> dict[str, Any]:
     except ShadowPuppetError as error:  # the run is complete: a bad truth file must not discard it
         warn(f"no errors are computed: {error}")
         return evaluate(motion, camera=camera, cameras=cameras)
+
+
+def judge(writer: RunWriter, rig: Rig, look: Look | RigLook, person: Person, options: Options) -> dict[str, Any]:
+    """Complete the run's entries: its floor, its errors and the verdict on it. Returns the errors and other metrics of the motion."""
+    writer.info |= floor_entry(writer.motion, rig.cameras, person)
+    writer.check()
+    found, frames = evaluated(rig, writer.motion), (len(writer.motion), tracked(look.frames, options.every))
+    verdict = verdict_of_run(look, writer.motion, writer.metrics.get("set_aside", ()), frames)
+    writer.metrics |= found | {"verdict": verdict.plain()}
+    return found
+
+
+def summary(folder: str | Path, found: dict[str, Any], look: Look | RigLook) -> Summary:
+    """The finished run in a folder, with warnings of what was lost and left out; `found`: metrics of its motion."""
+    written = read_run(folder)
+    metrics = written.metrics | found
+    warn_of_losses(written.motion)
+    warn_of_left_out(metrics.get("left_out", []))
+    warn_of_set_aside(metrics.get("set_aside", []))
+    return Summary(Path(folder), written.motion, metrics, look)

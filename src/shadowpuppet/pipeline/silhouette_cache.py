@@ -9,14 +9,13 @@ import zlib
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.colour_codes import ColourCode, thinned
 from shadowpuppet.camera.mask import Mask, Seen
-from shadowpuppet.pipeline.look import Survey
+from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.rig import FrameSet, Rig
 
@@ -27,7 +26,7 @@ LIMIT = 256_000_000
 """Greatest size of the kept silhouettes, bytes: about half an hour of one camera's 25 frames/s at 320 x 240."""
 
 
-def film_of(recording: str | Path, settings: Mapping[str, Any]) -> dict[str, Any]:
+def film_of(recording: str | Path, settings: Mapping[str, object]) -> dict[str, object]:
     """Recording and options that must be equal for two runs to share silhouettes; `settings`: plain values, as from `plain_options`."""
     return {"recording": str(Path(recording).resolve()), **{name: settings.get(name) for name in SHARED}}
 
@@ -105,7 +104,7 @@ def _codes(mask: Mask | None, packed: bytes | None) -> ColourCode | None:
     return codes
 
 
-def _state(rig: Rig) -> dict[str, Any]:
+def _state(rig: Rig) -> dict[str, object]:
     """The state of the files on which silhouettes depend, by name: a film may be replaced between two runs."""
     return {name: state for name, state in rig.inputs.began.items() if not name.startswith("--") or name.removeprefix("--") in SHARED}
 
@@ -116,7 +115,7 @@ class SilhouetteCache:
     def __init__(self, limit: int = LIMIT) -> None:
         """`limit`: greatest size of the kept silhouettes, bytes; those of longer films are not kept."""
         self.limit = limit
-        self._film: dict[str, Any] | None = None
+        self._film: dict[str, object] | None = None
         self._survey: Survey | None = None
         self._store = MaskStore(limit)
 
@@ -125,12 +124,14 @@ class SilhouetteCache:
         film = film_of(rig.recording.path, plain_options(options)) | {"state": _state(rig)}
         if self._survey is None or film != self._film:
             self.forget()
-            self._survey, self._film = make(rig, options), film
+            survey = make(rig, options)
+            self._survey, self._film = survey.settled(), film
+            return survey
         return self._survey
 
     def keep(self, survey: Survey) -> None:
         """Keep another survey of the same film, whose silhouettes differ."""
-        self._survey, self._store = survey, MaskStore(self.limit)
+        self._survey, self._store = survey.settled(), MaskStore(self.limit)
 
     def is_complete(self, options: Options) -> bool:
         """Whether all silhouettes of the surveyed recording are kept and can be used; not with an overlay, which needs the images."""

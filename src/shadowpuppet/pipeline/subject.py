@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, Generic, NamedTuple, Protocol, Self, TypeVar
+from typing import ClassVar, Generic, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.camera.bits import Bits
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, Seen
-from shadowpuppet.errors import Caution
+from shadowpuppet.errors import Finding
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person
 from shadowpuppet.motion.contact.contact import under_feet
@@ -77,9 +77,9 @@ class FittedPerson:
     body: Body
     person: Person
     """Sizes that other runs can use, written to person.toml."""
-    summary: dict[str, Any]
+    summary: dict[str, object]
     """How the person was fitted, as plain values: the entry `person` of look.json."""
-    doubts: tuple[Caution, ...] = ()
+    doubts: tuple[Finding, ...] = ()
     """Doubts about the fit, a sentence each."""
     beside: tuple[BesideBody | None, ...] = ()
     """What the body leaves unexplained in each camera's silhouettes; empty, or None, for nothing."""
@@ -192,7 +192,7 @@ def average_body(name: str) -> Body:
     return make_body(name, average_sizes(name, AVERAGE_HEIGHT))
 
 
-def floor_entry(motion: Motion, cameras: Sequence[Camera], person: Person) -> dict[str, Any]:
+def floor_entry(motion: Motion, cameras: Sequence[Camera], person: Person) -> dict[str, dict[str, float | str]]:
     """The entry `floor` of run.toml of a run whose only camera is known by its field of view alone, so that the world does not have its
     floor at 0: exports put it there. Empty for others."""
     if len(cameras) > 1 or cameras[0].oriented:

@@ -85,15 +85,6 @@ class AddedParts(NamedTuple):
         return f"something that never moves within x {x[0]} to {x[1]}, y {y[0]} to {y[1]}, and is not in the empty scene"
 
 
-class SceneHint(NamedTuple):
-    """What a first look at a film and a first fit say of its scene."""
-
-    beside: BesideBody | None = None
-    """What the body leaves unexplained; None: nothing."""
-    added: AddedParts | None = None
-    """What is known to have been added to the scene; None: nothing."""
-
-
 def always_alike(masks: Sequence[Mask]) -> bool:
     """Whether masks (H, W) hardly differ, so that perhaps no person is in them."""
     shown = [mask for mask in masks if mask.any()]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.mask import NEARLY_ALL, Mask
-from shadowpuppet.errors import HARMFUL, NOTED, Caution, SilhouetteError
+from shadowpuppet.errors import HARMFUL, NOTED, Finding, SilhouetteError
 
 MIN_AREA = 0.003
 """Least share of the picture that a person must cover for limbs to be wide enough (15 pixels high of 240)."""
@@ -93,62 +93,64 @@ class MaskQuality:
         """Sides of the picture at which the person is cut off, but for the bottom, where an upper body's legs may be."""
         return tuple(side for side in ("left", "right", "top") if self.border[side] > WARN_CONTACT)
 
-    def warnings(self, whole_elsewhere: bool = False) -> tuple[Caution, ...]:
+    def warnings(self, whole_elsewhere: bool = False) -> tuple[Finding, ...]:
         """What harms tracking, and the remedy, a sentence each; none if there is a refusal. `whole_elsewhere`: whether enough other cameras
         show all of a person who is cut off."""
         return () if self.refusal() else (*self._incomplete(NOTED if whole_elsewhere else HARMFUL), *self._unsteady(), *self._unclean())
 
-    def _incomplete(self, cut_off: int) -> Iterator[Caution]:
+    def _incomplete(self, cut_off: int) -> Iterator[Finding]:
         if self.empty:
             why = ("or the masks miss them; cut the film, or make the masks anew" if self.ready else
                    "or does not differ from the background; cut the film, or set another method")
-            yield Caution(f"the silhouette is empty in {self._share(self.empty)} of the frames, first in frame {self.first_empty}: the "
+            yield Finding(f"the silhouette is empty in {self._share(self.empty)} of the frames, first in frame {self.first_empty}: the "
                           f"person is out of the picture, {why}",
                           f"nobody seen in {self._share(self.empty)} of frames: cut them",
-                          HARMFUL if self.empty > 0.3 * self.frames else NOTED)
+                          HARMFUL if self.empty > 0.3 * self.frames else NOTED, {"frames": self.frames, "empty": self.empty})
         if self.full:
             why, short = (("make the masks anew", f"masks cover all at frame {self.first_full}: make them anew") if self.ready else
                           ("the light changed or the camera moved; cut the film there, or fix camera and exposure",
                            f"light or camera changed at frame {self.first_full}: --end {self.first_full}f"))
-            yield Caution(f"nearly all of the picture is silhouette in {self._share(self.full)} of the frames, first in frame "
-                          f"{self.first_full}: {why}", short, HARMFUL)
+            yield Finding(f"nearly all of the picture is silhouette in {self._share(self.full)} of the frames, first in frame "
+                          f"{self.first_full}: {why}", short, HARMFUL, {"frames": self.frames, "full": self.full})
         for side in self.cut_off:
-            yield Caution(f"the silhouette touches the {side} border in {_percent(self.border[side])} of the frames: the person "
+            yield Finding(f"the silhouette touches the {side} border in {_percent(self.border[side])} of the frames: the person "
                           "is partly outside the picture, and what is outside is guessed; step back, or turn the camera",
-                          f"person is cut off at the {side}: step back", cut_off)
+                          f"person is cut off at the {side}: step back", cut_off, {"percent": 100 * self.border[side]})
         if 0 < self.area < MIN_AREA:
-            yield Caution(f"the person covers {100 * self.area:.2g} % of the picture: too little to see limbs; go nearer, or use a "
-                          "camera with more pixels", "person is too small in the picture: go nearer", HARMFUL)
+            yield Finding.of("the person covers {percent:.2g} % of the picture: too little to see limbs; go nearer, or use a camera with "
+                             "more pixels", "person is too small in the picture: go nearer", HARMFUL, percent=100 * self.area)
 
-    def _unsteady(self) -> Iterator[Caution]:
+    def _unsteady(self) -> Iterator[Finding]:
         remedy = ANEW if self.ready else (
                   "the person hardly differs from the background, or was taken for it where it was made from the film; give a picture "
                   "of the empty scene, more light, or other clothes")
         short = "parts of the person vanish: " + ("make the masks anew" if self.ready else "film the empty scene")
         if self.area_jumps > WARN_JUMPS:
-            yield Caution(f"the area of the silhouette changes by over {_percent(AREA_JUMP)} at once in {_percent(self.area_jumps)} of the "
-                          f"frames, as parts are lost and found: {remedy}", short, HARMFUL)
+            yield Finding(f"the area of the silhouette changes by over {_percent(AREA_JUMP)} at once in {_percent(self.area_jumps)} of the "
+                          f"frames, as parts are lost and found: {remedy}", short, HARMFUL, {"percent": 100 * self.area_jumps})
         elif self.area_change > WARN_AREA_CHANGE:
-            yield Caution(f"the area of the silhouette changes by {_percent(self.area_change)} from frame to frame: {remedy}", short,
-                          HARMFUL)
+            yield Finding(f"the area of the silhouette changes by {_percent(self.area_change)} from frame to frame: {remedy}", short,
+                          HARMFUL, {"percent": 100 * self.area_change})
         if self.flicker > WARN_FLICKER:
             why = ANEW if self.ready else ("noise in dim light, a lamp's flicker, or silhouettes that are not cleaned; use more light, or "
                                            "--silhouette.clean")
-            yield Caution(f"pixels worth {_percent(self.flicker)} of the person's area flicker from frame to frame: {why}",
-                          f"outlines flicker: {'make the masks anew' if self.ready else 'use more light'}", HARMFUL)
+            yield Finding(f"pixels worth {_percent(self.flicker)} of the person's area flicker from frame to frame: {why}",
+                          f"outlines flicker: {'make the masks anew' if self.ready else 'use more light'}", HARMFUL,
+                          {"percent": 100 * self.flicker})
 
-    def _unclean(self) -> Iterator[Caution]:
+    def _unclean(self) -> Iterator[Finding]:
         if self.speck_area > WARN_SPECK_AREA:
             why, short = (("make the masks of the person alone", "masks hold more than the person: make them anew") if self.ready else
                           ("noise, shadow or another person; use --silhouette.clean, or keep others out of the picture",
                            "noise, shadows or others beside the person: keep them out"))
-            yield Caution(f"the silhouette has {self.specks:.1f} parts beside the person, {_percent(self.speck_area)} of its area: {why}",
-                          short, HARMFUL)
+            yield Finding(f"the silhouette has {self.specks:.1f} parts beside the person, {_percent(self.speck_area)} of its area: {why}",
+                          short, HARMFUL, {"parts": self.specks, "percent": 100 * self.speck_area})
         if self.hole_area > WARN_HOLE_AREA or self.holes > WARN_HOLES:
             why, short = ((ANEW, "masks have holes: make them anew") if self.ready else
                           ("clothes like the background, or noise; try another method, or other clothes",
                            "silhouettes have holes: wear other colours than the background"))
-            yield Caution(f"the silhouette has {self.holes:.1f} holes, {_percent(self.hole_area)} of its area: {why}", short, HARMFUL)
+            yield Finding(f"the silhouette has {self.holes:.1f} holes, {_percent(self.hole_area)} of its area: {why}", short, HARMFUL,
+                          {"holes": self.holes, "percent": 100 * self.hole_area})
 
     def _share(self, frames: int) -> str:
         return _percent(frames / self.frames)

@@ -112,7 +112,7 @@ def surveyed(folder: Path, rig: list, masks: list):
 def test_cameras_that_agree_about_each_person_are_not_doubted(seen, tmp_path):
     """All people together are taller and wider than a person: that says nothing about the calibration."""
     look = surveyed(tmp_path, *seen)
-    assert [doubt.short for doubt in look.doubts if doubt.weight != NOTED] == []
+    assert [doubt.short for doubt in look.findings if doubt.severity != NOTED] == []
     assert 1.5 < look.agreement.height < 2.0
 
 
@@ -121,7 +121,7 @@ def test_a_camera_that_was_turned_is_named_by_several_people(seen, tmp_path, deg
     rig, masks = seen
     turn = rigid(rotation_about([0, 1, 0], np.radians(degrees)), np.zeros(3))
     turned = [*rig[:2], replace(rig[2], T_camera_world=turn @ rig[2].T_camera_world), rig[3]]
-    assert any("cam3" in doubt.short for doubt in surveyed(tmp_path, turned, masks).doubts)
+    assert any("cam3" in doubt.short for doubt in surveyed(tmp_path, turned, masks).findings)
 
 
 def test_each_has_a_run_of_their_own(run):

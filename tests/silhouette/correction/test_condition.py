@@ -64,7 +64,7 @@ def test_what_is_too_much_is_named(spoil, noise, said):
 
 @pytest.mark.parametrize(("frames", "weight"), [(4, HARMFUL), (15, RUINOUS)])
 def test_a_camera_that_is_covered_for_a_time_does_not_ruin_a_film(frames, weight):
-    assert condition(lambda n, empty: 0 * empty if n < frames else empty).warnings()[0].weight == weight
+    assert condition(lambda n, empty: 0 * empty if n < frames else empty).warnings()[0].severity == weight
 
 
 @pytest.mark.parametrize("spoil", [

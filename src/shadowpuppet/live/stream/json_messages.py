@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -37,9 +36,9 @@ def framed(frame: StreamFrame) -> str:
     })  # fmt: skip
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     return json.dumps(value, allow_nan=False, separators=(",", ":"))
 
 
-def _numbers(values: Array | None, digits: int) -> Any:
+def _numbers(values: Array | None, digits: int) -> object:
     return None if values is None else (np.round(values, digits) + 0.0).tolist()

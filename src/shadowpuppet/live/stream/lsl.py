@@ -78,6 +78,6 @@ class LslOutlet(Outlet):
         self._outlet.push_sample(sample.ravel().tolist(), self._pylsl.local_clock() - late)
         self.sent += 1
 
-    def counts(self) -> dict[str, Any]:
+    def counts(self) -> dict[str, int]:
         """Number of samples sent."""
         return {"sent": self.sent}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from types import TracebackType
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -123,7 +124,7 @@ class Outlet:
         """The latest problem as a sentence, reported once; empty if there is none."""
         return ""
 
-    def counts(self) -> dict[str, Any]:
+    def counts(self) -> Mapping[str, object]:
         """Numbers for metrics.json."""
         return {}
 
@@ -151,9 +152,9 @@ class Outlets(Outlet):
             self._open = opened.pop_all()
         return self
 
-    def __exit__(self, *error: Any) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         """Close all outlets."""
-        self._open.__exit__(*error)
+        self._open.__exit__(kind, error, trace)
 
     def begin(self, subject: StreamSubject) -> None:
         """Start all outlets with a newly measured person."""
@@ -174,7 +175,7 @@ class Outlets(Outlet):
         self._problems += [problem for outlet in self._working if (problem := outlet.trouble())]
         return self._problems.pop(0) if self._problems else ""
 
-    def counts(self) -> dict[str, Any]:
+    def counts(self) -> Mapping[str, object]:
         """Numbers for metrics.json of each outlet, by its name."""
         return {outlet.name: counts for outlet in self._all if (counts := outlet.counts())}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Iterable, Iterator
-from typing import Any
 
 import numpy as np
 from pythonosc.osc_bundle import OscBundle
@@ -95,7 +94,7 @@ class VmcOutlet(Outlet):
         self._reported = True
         return f"{self.where}: cannot be sent ({self._problem}); it is tried with every frame, and the session goes on"
 
-    def counts(self) -> dict[str, Any]:
+    def counts(self) -> dict[str, int]:
         """Number of datagrams sent and failed."""
         return {"sent": self.sent, "failed": self.failed}
 

@@ -7,7 +7,7 @@ import socket
 import threading
 from collections.abc import Callable, Sequence
 from http import HTTPStatus
-from typing import Any, Self
+from typing import TYPE_CHECKING, Self
 
 from shadowpuppet.errors import SettingsError, extra_command, reason
 from shadowpuppet.live.stream.json_messages import beginning, framed
@@ -23,6 +23,11 @@ from shadowpuppet.network import (
     shown_host,
     silent_logger,
 )
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import Server, ServerConnection
+    from websockets.datastructures import Headers
+    from websockets.http11 import Request, Response
 
 SEND_BUFFER = 16384
 """Bytes buffered for a slow client, a few frames; after those it gets the newest frame."""
@@ -77,7 +82,7 @@ class WebSocketOutlet(Outlet):
         """Set the newest frame; a slow client skips those before it."""
         self._call(lambda: self._put("", frame))
 
-    def counts(self) -> dict[str, Any]:
+    def counts(self) -> dict[str, int]:
         """Number of connections served and refused."""
         return {"served": self.served, "refused": self.refused}
 
@@ -119,11 +124,11 @@ class WebSocketOutlet(Outlet):
             connection.transport.abort()
         await closing
 
-    async def _closed(self, server: Any) -> None:
+    async def _closed(self, server: Server) -> None:
         server.close(close_connections=False)
         await server.wait_closed()
 
-    async def _follow(self, connection: Any) -> None:
+    async def _follow(self, connection: ServerConnection) -> None:
         """Serve one client until it disconnects, reads nothing for `SEND_SECONDS`, or the session ends."""
         from websockets.exceptions import ConnectionClosed
 
@@ -145,7 +150,7 @@ class WebSocketOutlet(Outlet):
             connected.cancel()
             self._clients.leave(address)
 
-    async def _send_newest(self, connection: Any, connected: asyncio.Future[None]) -> None:
+    async def _send_newest(self, connection: ServerConnection, connected: asyncio.Future[None]) -> None:
         frame_number, subject_number = 0, 0
         while not connected.done() and not self._over.is_set():
             changed = self._changed
@@ -161,12 +166,12 @@ class WebSocketOutlet(Outlet):
                 await asyncio.wait([waiting, connected], return_when=asyncio.FIRST_COMPLETED)
                 waiting.cancel()
 
-    async def _read(self, connection: Any) -> None:
+    async def _read(self, connection: ServerConnection) -> None:
         """Read and ignore what a client sends; returns when it disconnects."""
         async for _ in connection:
             pass
 
-    def _check(self, connection: Any, request: Any) -> Any:
+    def _check(self, connection: ServerConnection, request: Request) -> Response | None:
         """None for a request that is accepted; else the response that refuses it."""
         why = self._refusal(request.headers, _address(connection))
         if why:
@@ -174,7 +179,7 @@ class WebSocketOutlet(Outlet):
             return connection.respond(HTTPStatus.FORBIDDEN, f"{why}\n")
         return None
 
-    def _refusal(self, headers: Any, address: str) -> str:
+    def _refusal(self, headers: Headers, address: str) -> str:
         if not is_own_host(headers, self.loopback):
             return "this is served under the machine's own address only"
         if not are_origins_allowed(headers, self.origins):
@@ -182,13 +187,13 @@ class WebSocketOutlet(Outlet):
         return "" if self._clients.has_room(address) else "too many listen already"
 
 
-async def _send(connection: Any, text: str) -> None:
+async def _send(connection: ServerConnection, text: str) -> None:
     """Send a message. Raises `TimeoutError` if the client does not make room for the next one within `SEND_SECONDS`."""
     async with asyncio.timeout(SEND_SECONDS):
         await connection.send(text)
 
 
-def _address(connection: Any) -> str:
+def _address(connection: ServerConnection) -> str:
     """The address of a connection's client."""
     return (connection.remote_address or ("",))[0]
 

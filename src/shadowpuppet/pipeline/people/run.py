@@ -24,8 +24,9 @@ from shadowpuppet.io.people import open_places, person_folder, write_place
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import RunWriter, write_metrics
 from shadowpuppet.motion.motion import Motion, MotionFrame
+from shadowpuppet.pipeline.findings.look import RigLook, Survey
+from shadowpuppet.pipeline.findings.verdict import verdict_of_run
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
-from shadowpuppet.pipeline.look import RigLook, Survey
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.overlay_video import overlay_of_people
 from shadowpuppet.pipeline.people.census import Census
@@ -53,7 +54,6 @@ from shadowpuppet.pipeline.progress import (
 )
 from shadowpuppet.pipeline.rig import FrameSet, Rig, read_frames
 from shadowpuppet.pipeline.subject import joint_names, motion_frame
-from shadowpuppet.pipeline.verdict.of_run import verdict_of_run
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.frozen import Interval
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull

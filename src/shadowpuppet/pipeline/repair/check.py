@@ -16,12 +16,12 @@ from shadowpuppet.calibration.rotation_error import RotationError, estimate_plac
 from shadowpuppet.calibration.silhouettes import Row, silhouettes_of
 from shadowpuppet.calibration.time_offset import TimeOffsets, time_offsets
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
+from shadowpuppet.pipeline.findings.film import brief_length
 from shadowpuppet.pipeline.footage import Footage, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, uncluttered_silhouettes
-from shadowpuppet.pipeline.survey.film import brief_length
 from shadowpuppet.threads import usable_cores
 
 SETS, MIN_SETS, MAX_SETS_READ = 240, 120, 3000
@@ -267,7 +267,7 @@ def doubts_of(check: CalibrationCheck) -> list[str]:
         said.append(f"the films do not begin together ({text}): put into [start] of recording.toml: {start}")
     if found.hopeless and found.remedy is not None:
         return [*said, found.remedy]
-    said += [doubt for doubt in found.doubts() if not any(f"camera {name!r} disagrees" in doubt for name in check.turns)]
+    said += [str(doubt) for doubt in found.doubts() if not any(f"camera {name!r} disagrees" in doubt for name in check.turns)]
     for name in check.turns or (() if found.doubts() else _standing_out(found, STANDOUT_FACTOR)):
         others = [other for other in found.names if other != name]
         rest = max(value for other, value in zip(found.names, found.apart) if other != name and value is not None)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Finding
 from shadowpuppet.silhouette.background import Image, smoothed, to_planes
 from shadowpuppet.silhouette.correction.frame_correction import Corrected, Correction
 from shadowpuppet.silhouette.correction.motion_blur import blurred_share
@@ -66,62 +66,64 @@ class FilmCondition:
         """Whether most of a frame is copied from the last."""
         return self.copied is not None and self.copied > COPIED
 
-    def warnings(self, recovered: bool = False) -> tuple[Caution, ...]:
+    def warnings(self, recovered: bool = False) -> tuple[Finding, ...]:
         """What harms the silhouettes, and the remedy, a sentence each. `recovered`: whether the empty scene was recovered from the film,
         not filmed by itself."""
         return (*self._movement(recovered), *self._light(), *self._noise(recovered), *self._blur())
 
-    def _movement(self, recovered: bool) -> Iterator[Caution]:
+    def _movement(self, recovered: bool) -> Iterator[Finding]:
         remedy = "its frames are shifted back, and what they do not show of the scene is guessed"
         if self.moved_since is not None:
             when = "throughout" if self.moved_frames == 1 else f"from about {self.moved_since:.1f} s on"
-            yield Caution(f"the camera is up to {self.moved:.1f} pixels from where it saw the empty scene, {when}: {remedy}; fix the "
-                          "tripod", f"camera moved by {self.moved:.0f} pixels: fix the tripod", NOTED)
+            yield Finding.of(f"the camera is up to {{pixels:.1f}} pixels from where it saw the empty scene, {when}: {remedy}; fix the "
+                             "tripod", "camera moved by {pixels:.0f} pixels: fix the tripod", NOTED, pixels=self.moved)
         elif self.moved:
-            yield Caution(f"the camera moves by up to {self.moved:.1f} pixels, in {100 * self.moved_frames:.0f} % of the frames: {remedy}; "
-                          "fix the tripod", f"camera shakes by {self.moved:.0f} pixels: fix the tripod", NOTED)
+            yield Finding.of(f"the camera moves by up to {{pixels:.1f}} pixels, in {{percent:.0f}} % of the frames: {remedy}; fix the "
+                             "tripod", "camera shakes by {pixels:.0f} pixels: fix the tripod", NOTED, pixels=self.moved,
+                             percent=100 * self.moved_frames)
+        percent = 100 * self.unmatched
         if self.unmatched > WARN_UNMATCHED and recovered:
-            yield Caution(f"{100 * self.unmatched:.0f} % of the frames do not fit the empty scene that was recovered from the film: the "
-                          "person hides too much of it, or the camera moves; film it without the person, and step back",
-                          "empty scene cannot be told from the film: film it", RUINOUS)
+            yield Finding.of("{percent:.0f} % of the frames do not fit the empty scene that was recovered from the film: the "
+                             "person hides too much of it, or the camera moves; film it without the person, and step back",
+                             "empty scene cannot be told from the film: film it", RUINOUS, percent=percent)
         elif WARN_UNMATCHED < self.unmatched < UNMATCHED_MOSTLY:
-            yield Caution(f"{100 * self.unmatched:.0f} % of the frames do not show the empty scene: the camera was covered, black or moved "
-                          "by over a tenth of the picture for that time; look at the film, and cut it there",
-                          f"camera covered or moved in {100 * self.unmatched:.0f} % of frames: cut them", HARMFUL)
+            yield Finding.of("{percent:.0f} % of the frames do not show the empty scene: the camera was covered, black or moved "
+                             "by over a tenth of the picture for that time; look at the film, and cut it there",
+                             "camera covered or moved in {percent:.0f} % of frames: cut them", HARMFUL, percent=percent)
         elif self.unmatched > WARN_UNMATCHED:
-            yield Caution(f"{100 * self.unmatched:.0f} % of the frames do not show the empty scene: the camera was moved by over a tenth "
-                          "of the picture, is covered, or films another place; take the empty scene again",
-                          "the empty scene is another place's: film it again", RUINOUS)
+            yield Finding.of("{percent:.0f} % of the frames do not show the empty scene: the camera was moved by over a tenth "
+                             "of the picture, is covered, or films another place; take the empty scene again",
+                             "the empty scene is another place's: film it again", RUINOUS, percent=percent)
 
-    def _light(self) -> Iterator[Caution]:
+    def _light(self) -> Iterator[Finding]:
         least, most = self.gain
         if max(1 / least, most) > WARN_GAIN:
-            yield Caution(f"the film's light is {least:.2f} to {most:.2f} times the empty scene's: this is followed up to about 1.4; "
-                          "fix exposure and white balance, or take the empty scene again",
-                          "light changes too much: fix exposure and white balance", HARMFUL)
+            yield Finding.of("the film's light is {least:.2f} to {most:.2f} times the empty scene's: this is followed up to about 1.4; "
+                             "fix exposure and white balance, or take the empty scene again",
+                             "light changes too much: fix exposure and white balance", HARMFUL, least=least, most=most)
 
-    def _noise(self, recovered: bool) -> Iterator[Caution]:
+    def _noise(self, recovered: bool) -> Iterator[Finding]:
         lasts = self.change is not None and self.change < STEADY * self.noise
         if lasts and self.noise > WARN_COMPRESSION and self.compressed:
-            yield Caution(f"the film is compressed too much (its pixels are {self.noise:.1f} grey levels off the empty scene): outlines "
-                          "are blurred, and thin limbs merge with what is behind them; film at a higher bit rate or quality",
-                          "film is compressed too much: use a higher quality", HARMFUL)
+            yield Finding.of("the film is compressed too much (its pixels are {grey_levels:.1f} grey levels off the empty scene): outlines "
+                             "are blurred, and thin limbs merge with what is behind them; film at a higher bit rate or quality",
+                             "film is compressed too much: use a higher quality", HARMFUL, grey_levels=self.noise)
         elif lasts and self.noise > WARN_ERROR:
             scene, remedy, short = "its empty scene", "take the empty scene again", "light differs from the empty scene's: film that again"
             if recovered:
                 scene, remedy = "the empty scene that was recovered from it", "film the empty scene"
                 short = "the recovered empty scene differs from the film: film it"
-            yield Caution(f"the film differs from {scene} by {self.noise:.1f} grey levels in light that no smooth change explains: "
-                          f"clothes like the background are missed; {remedy} in this light", short, HARMFUL)
+            yield Finding.of(f"the film differs from {scene} by {{grey_levels:.1f}} grey levels in light that no smooth change explains: "
+                             f"clothes like the background are missed; {remedy} in this light", short, HARMFUL, grey_levels=self.noise)
         elif self.noise > WARN_NOISE:
-            yield Caution(f"the film is noisy ({self.noise:.1f} grey levels after smoothing): clothes like the background are missed; use "
-                          "more light, or less gain of the camera", "film is noisy: use more light", HARMFUL)
+            yield Finding.of("the film is noisy ({grey_levels:.1f} grey levels after smoothing): clothes like the background are missed; "
+                             "use more light, or less gain of the camera", "film is noisy: use more light", HARMFUL, grey_levels=self.noise)
 
-    def _blur(self) -> Iterator[Caution]:
+    def _blur(self) -> Iterator[Finding]:
         if self.blur is not None and self.blur > WARN_BLUR and not self.compressed:
-            yield Caution(f"moving limbs are blurred ({100 * self.blur:.0f} % of what they reach or leave within two frames is half limb, "
-                          "half background): they look too wide, or vanish; use a shorter exposure with more light",
-                          "moving limbs are blurred: use a shorter exposure", HARMFUL)
+            yield Finding.of("moving limbs are blurred ({percent:.0f} % of what they reach or leave within two frames is half limb, "
+                             "half background): they look too wide, or vanish; use a shorter exposure with more light",
+                             "moving limbs are blurred: use a shorter exposure", HARMFUL, percent=100 * self.blur)
 
 
 class _State(NamedTuple):

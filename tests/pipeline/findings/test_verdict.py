@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import fields, replace
+import json
+from dataclasses import FrozenInstanceError, fields, replace
 
 import numpy as np
 import pytest
 
 from shadowpuppet.calibration.agreement import Agreement
-from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Finding
 from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
-from shadowpuppet.pipeline.look import Look, RigLook
-from shadowpuppet.pipeline.verdict.of_run import _together, blind_frames, expected_error, lost_share, verdict_of_run
-from shadowpuppet.pipeline.verdict.verdict import verdict_of, verdict_of_look
+from shadowpuppet.pipeline.findings.look import Look, RigLook
+from shadowpuppet.pipeline.findings.verdict import (
+    _together,
+    blind_frames,
+    expected_error,
+    lost_share,
+    verdict_of,
+    verdict_of_look,
+    verdict_of_run,
+)
+from shadowpuppet.pipeline.progress import json_text
 from shadowpuppet.silhouette.correction.condition import FilmCondition
 from shadowpuppet.silhouette.quality import MaskQuality
 
@@ -26,8 +35,8 @@ LOOK = Look(recording="film", camera="cam", size=(320, 240), worked_size=(320, 2
             exact_overlap_plain=None, quality=QUALITY)
 
 
-def caution(weight: int, name: str = "x") -> Caution:
-    return Caution(f"a sentence on {name}", name, weight)
+def caution(weight: int, name: str = "x") -> Finding:
+    return Finding(f"a sentence on {name}", name, weight)
 
 
 @pytest.mark.parametrize(("weights", "word"), [((), "good"), ((NOTED,) * 5, "good"), ((NOTED, HARMFUL), "doubtful"),
@@ -41,14 +50,29 @@ def test_reasons_are_the_three_heaviest_each_once():
     assert verdict.reasons == ("d", "b", "c")
 
 
-def test_a_caution_is_its_sentence_and_survives_copies():
-    made = Caution("long and whole", "short", HARMFUL)
+def test_a_finding_reads_as_its_sentence_and_survives_copies():
+    made = Finding("long and whole", "short", HARMFUL)
     for same in (made, copy.deepcopy(made), copy.copy(made)):
-        assert (same, same.short, same.weight) == ("long and whole", "short", HARMFUL)
-    assert made.at_most(NOTED).weight == NOTED
-    assert made.at_most(RUINOUS).weight == HARMFUL
+        assert (str(same), same.short, same.severity) == ("long and whole", "short", HARMFUL)
+    assert made.at_most(NOTED).severity == NOTED
+    assert made.at_most(RUINOUS).severity == HARMFUL
     about = made.about("camera 'a'")
-    assert (about, about.short, about.weight) == ("camera 'a': long and whole", "camera 'a': short", HARMFUL)
+    assert (str(about), about.short, about.severity) == ("camera 'a': long and whole", "camera 'a': short", HARMFUL)
+
+
+def test_a_findings_words_hold_its_figures_and_no_name_in_them_is_a_figure():
+    made = Finding.of("camera {camera!r} moved by {pixels:.1f} pixels", "{camera}: {pixels:.0f} px", HARMFUL, camera="{pixels}", pixels=2.6)
+    assert (made.words, made.short) == ("camera '{pixels}' moved by 2.6 pixels", "{pixels}: 3 px")
+    assert made.evidence == {"camera": "{pixels}", "pixels": 2.6}
+    assert made.about("film").evidence == made.at_most(NOTED).evidence == made.evidence
+    assert "2.6 pixels" in made
+    with pytest.raises(FrozenInstanceError):
+        made.words = "nothing"
+
+
+def test_findings_are_saved_with_their_evidence():
+    (saved,) = json.loads(json_text(replace(LOOK, findings=(Finding.of("{x:.1f}", "x", NOTED, x=np.float64(1.25)),))))["findings"]
+    assert saved == {"words": "1.2", "short": "x", "severity": NOTED, "evidence": {"x": 1.25}}
 
 
 def test_a_recording_that_cannot_be_tracked_is_bad():
@@ -56,7 +80,7 @@ def test_a_recording_that_cannot_be_tracked_is_bad():
     assert verdict_of_look(LOOK).word == "good"
 
 
-def all_cautions() -> list[Caution]:
+def all_cautions() -> list[Finding]:
     """Those of the worst silhouettes, film and cameras."""
     worst = replace(QUALITY, area=0.001, area_change=1.0, area_jumps=1.0, flicker=1.0, specks=9.0, speck_area=1.0, holes=9.0, hole_area=1.0,
                     border=dict.fromkeys(QUALITY.border, 1.0), empty=9, full=9, first_empty=3, first_full=7)
@@ -73,8 +97,8 @@ def test_every_reason_has_at_most_ten_words():
     assert len(cautions) > 15
     for each in cautions:
         assert 3 <= len(each.short.split()) <= 10, each.short
-        assert len(each.split()) > len(each.short.split()) or each == "say so"
-        assert each.weight in (NOTED, HARMFUL, RUINOUS)
+        assert len(each.words.split()) > len(each.short.split()) or each.words == "say so"
+        assert each.severity in (NOTED, HARMFUL, RUINOUS)
 
 
 def motion(sd: float, *, statuses: str = "tttttttttt", doubtful: int = 0) -> Motion:
@@ -157,7 +181,7 @@ def test_a_run_with_far_fewer_frames_than_the_film_states_is_not_good(frames, wo
 
 
 def test_what_the_look_found_is_among_the_reasons():
-    verdict = verdict_of_run(replace(LOOK, doubts=(caution(HARMFUL, "film is noisy: use more light"),)), motion(0.03, doubtful=2))
+    verdict = verdict_of_run(replace(LOOK, findings=(caution(HARMFUL, "film is noisy: use more light"),)), motion(0.03, doubtful=2))
     assert verdict == ("doubtful", ("film is noisy: use more light", "left arm doubtful in 20 % of frames"))
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from shadowpuppet.calibration.agreement import Agreement
 from shadowpuppet.camera.mask import Mask, Seen
-from shadowpuppet.errors import Caution
+from shadowpuppet.errors import Finding
+from shadowpuppet.pipeline.footage import Sample
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.silhouette.correction.condition import FilmCondition
@@ -19,77 +20,19 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Look:
-    """Findings about a recording of one camera; plain values, so that it can be saved."""
+class FilmLook:
+    """What one film shows; plain values."""
 
-    recording: str
-    """Its path."""
-    camera: str
-    """The camera's name."""
     size: tuple[int, int]
     """Width and height of the film, pixels."""
     worked_size: tuple[int, int]
     """Width and height that frames are scaled to."""
     fov: float
     """Horizontal field of view, degrees."""
-    calibrated: bool
-    """False if only the field of view is known."""
-    frames: int | None
-    """Number of the film's frames; None if the film does not state it."""
-    looked_at: int
-    """Number of frames that were read for this look."""
-    rate: float
-    """Frames/s."""
-    jitter: float
-    """Standard deviation of the frames' interval, seconds."""
-    scale: str
-    """Known lengths that fix the scale, in words."""
-    background: str
-    """Where the silhouettes come from."""
-    key: str
-    """Which channels are compared with the background, and why."""
-    area: float
-    """Mean share of the image that is silhouette."""
-    plain_area: float | None
-    """The same with the plain rule of eq. 1; None if the background has no standard deviation."""
-    exact_overlap: float | None
-    """Overlap (intersection over union) with the recording's ready silhouettes; None without these."""
-    exact_overlap_plain: float | None
-    """The same with the plain rule of eq. 1."""
-    quality: MaskQuality
-    """Quality of the silhouettes in the sampled frames."""
-    left_out: tuple[str, ...] = ()
-    """Parts of the silhouettes that are left out because they are not the person, in words and the film's pixels."""
-    condition: FilmCondition | None = None
-    """Noise, light and movement of the film in the sampled frames; None for ready silhouettes."""
-    person: dict[str, Any] | None = None
-    """Sizes (m), place (m) and overlaps of the fitted body, and the silhouettes it was fitted to if these are not the tracked ones; None if
-    it was not fitted."""
-    doubts: tuple[Caution, ...] = ()
-    """Possible problems of the run with their remedies, a sentence each."""
-    refusal: str | None = None
-    """Why tracking is hopeless; None if it is not."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class CameraLook:
-    """Findings about one of several cameras; plain values."""
-
-    name: str
-    size: tuple[int, int]
-    """Width and height of the film, pixels."""
-    worked_size: tuple[int, int]
-    """Width and height that frames are scaled to."""
-    fov: float
-    """Horizontal field of view, degrees."""
-    place: tuple[float, float, float]
-    """Its place in the world, metres."""
     frames: int | None
     """Number of frames from the recording's time 0 on; None if the film does not state it."""
     rate: float
     """Frames/s."""
-    start: float
-    """The recording's time 0 on the film's own clock, seconds."""
     background: str
     """Where the silhouettes come from."""
     key: str
@@ -105,24 +48,83 @@ class CameraLook:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RigLook:
-    """Findings about a recording of several cameras; plain values, so that it can be saved."""
+class CameraLook(FilmLook):
+    """Findings about one of several cameras; plain values."""
+
+    name: str
+    place: tuple[float, float, float]
+    """Its place in the world, metres."""
+    start: float
+    """The recording's time 0 on the film's own clock, seconds."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingLook:
+    """What a look at a recording says, with one camera or several; plain values, so that it can be saved."""
 
     recording: str
     """Its path."""
-    cameras: tuple[CameraLook, ...]
     rate: float
-    """Frame sets/s."""
+    """Frames, or frame sets of several cameras, a second."""
     frames: int | None
-    """Number of frame sets; None if the films do not state it."""
-    agreement: Agreement
-    """Agreement of the cameras, from the silhouettes of the first seconds."""
-    person: dict[str, Any] | None = None
-    """Sizes and how they were found; None if the person was not measured."""
-    doubts: tuple[Caution, ...] = ()
-    """Possible problems of the run with their remedies, a sentence each."""
+    """Number of frames or frame sets; None if the films do not state it."""
+    person: dict[str, object] | None = None
+    """Sizes (m) and how they were found; with one camera also place (m) and overlaps of the fitted body, and the silhouettes it was fitted
+    to if these are not the tracked ones. None if the person was not measured."""
+    findings: tuple[Finding, ...] = ()
+    """Possible problems of the run, with their remedies."""
     refusal: str | None = None
     """Why tracking is hopeless; None if it is not."""
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """The findings, a sentence each."""
+        return tuple(each.words for each in self.findings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look(RecordingLook, FilmLook):
+    """Findings about a recording of one camera."""
+
+    camera: str
+    """The camera's name."""
+    calibrated: bool
+    """False if only the field of view is known."""
+    looked_at: int
+    """Number of frames that were read for this look."""
+    jitter: float
+    """Standard deviation of the frames' interval, seconds."""
+    scale: str
+    """Known lengths that fix the scale, in words."""
+    area: float
+    """Mean share of the image that is silhouette."""
+    plain_area: float | None
+    """The same with the plain rule of eq. 1; None if the background has no standard deviation."""
+    exact_overlap_plain: float | None
+    """As `exact_overlap`, with the plain rule of eq. 1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigLook(RecordingLook):
+    """Findings about a recording of several cameras."""
+
+    cameras: tuple[CameraLook, ...]
+    agreement: Agreement
+    """Agreement of the cameras, from the silhouettes of the first seconds."""
+
+
+class FilmSurvey(NamedTuple):
+    """Result of examining one camera's film: its sample, silhouettes and findings."""
+
+    sample: Sample
+    silhouettes: Silhouettes
+    runs: list[list[Mask]]
+    """Silhouettes of the sample's runs, with the clutter."""
+    masks: list[Mask]
+    """Silhouettes of the sample's frames, without clutter."""
+    exact: list[Mask]
+    """The recording's ready silhouettes of the same frames; empty if there are none, or if `silhouettes` are these."""
+    look: FilmLook
 
 
 class FirstSeconds(NamedTuple):
@@ -157,12 +159,18 @@ class Survey:
     look: Look | RigLook
     census: Census | None = None
     """The number of people and their floor, with several cameras."""
+    films: tuple[FilmSurvey, ...] = ()
+    """For each camera what was found of its film, of one person; empty once the person is measured."""
 
     @property
     def several(self) -> bool:
         """Whether there are several people, each to be tracked."""
         return self.census is not None and self.census.number > 1
 
-    def look_with(self, person: dict[str, Any], doubts: tuple[Caution, ...]) -> Look | RigLook:
-        """A copy of `look` with the fitted person and the doubts about the fit."""
-        return replace(self.look, person=person, doubts=(*self.look.doubts, *doubts))
+    def settled(self) -> Survey:
+        """The survey without the films' samples, which nothing needs once the person is measured."""
+        return replace(self, films=())
+
+    def look_with(self, person: dict[str, object], findings: tuple[Finding, ...]) -> Look | RigLook:
+        """A copy of `look` with the fitted person and the findings about the fit."""
+        return replace(self.look, person=person, findings=(*self.look.findings, *findings))

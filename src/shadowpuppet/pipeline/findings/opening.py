@@ -10,8 +10,8 @@ import numpy as np
 
 from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import ShadowPuppetWarning
+from shadowpuppet.pipeline.findings.look import FirstSeconds
 from shadowpuppet.pipeline.footage import CameraFrame, Opening, Sample
-from shadowpuppet.pipeline.look import FirstSeconds
 from shadowpuppet.pipeline.rig import Rig, shown_in, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.threads import MadeOnDemand, usable_cores

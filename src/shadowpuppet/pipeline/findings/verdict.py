@@ -1,21 +1,26 @@
-"""The verdict on a finished run, from what it states of itself: frames lost, width of the intervals, doubtful limbs."""
+"""One word on a recording or a run (good, doubtful, bad) and at most three reasons, the weightiest first.
+
+A run is judged by what it states of itself: frames lost, width of the intervals, doubtful limbs.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
-from typing import Any
+from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Finding
 from shadowpuppet.motion.limbs import DOUBTFUL, joints_of_limbs, limbs_in_words
 from shadowpuppet.motion.metrics import LOST_ERROR
 from shadowpuppet.motion.motion import Motion
-from shadowpuppet.pipeline.look import Look, RigLook
-from shadowpuppet.pipeline.verdict.verdict import Verdict, verdict_of
+from shadowpuppet.pipeline.findings.look import Look, RigLook
 
+MOST = 3
+"""Greatest number of reasons."""
+Word = Literal["good", "doubtful", "bad"]
 MOSTLY_LOST = 0.5
 """Share of the frames with a person above which a run that loses them is a failure, with an exit code of its own."""
 OFTEN_LOST, OFTEN_DOUBTFUL = 0.05, {1: 0.6, 2: 0.4}
@@ -33,7 +38,47 @@ MEAN_DISTANCE = 2 * np.sqrt(2 / np.pi) / np.sqrt(3)
 """Mean length of a vector of three independent normal errors, over the root of the sum of their variances."""
 
 
-def verdict_of_run(look: Look | RigLook, motion: Motion, aside: Sequence[Mapping[str, Any]] = (),
+class SetAside(TypedDict):
+    """A camera that was set aside for a time, or was blind, in metrics.json."""
+
+    camera: str
+    why: str
+    frames: int
+    from_s: float
+    to_s: float
+
+
+class Verdict(NamedTuple):
+    """A verdict and its reasons."""
+
+    word: Word
+    reasons: tuple[str, ...]
+    """At most three, the weightiest first, each with what to do in at most ten words."""
+
+    def plain(self) -> dict[str, str | list[str]]:
+        """The verdict for JSON."""
+        return {"word": self.word, "reasons": list(self.reasons)}
+
+
+def ranked(findings: Iterable[Finding]) -> list[Finding]:
+    """Findings in the order in which they are told: the gravest first; those of one severity keep their order."""
+    return sorted(findings, key=lambda each: -each.severity)
+
+
+def verdict_of(findings: Iterable[Finding]) -> Verdict:
+    """The verdict that findings lead to: bad with a ruinous one, doubtful with a harmful one, else good."""
+    ordered = ranked(findings)
+    gravest = ordered[0].severity if ordered else 0
+    word: Word = "bad" if gravest >= RUINOUS else "doubtful" if gravest >= HARMFUL else "good"
+    return Verdict(word, tuple(dict.fromkeys(each.short for each in ordered))[:MOST])
+
+
+def verdict_of_look(look: Look | RigLook) -> Verdict:
+    """The verdict on a recording before it is tracked: bad if tracking is hopeless."""
+    return Verdict("bad", (look.refusal,)) if look.refusal is not None else verdict_of(look.findings)
+
+
+def verdict_of_run(look: Look | RigLook, motion: Motion, aside: Sequence[SetAside] = (),
                    frames: tuple[int, int | None] | None = None) -> Verdict:
     """The verdict on a run of a recording, from what the look found and what the run states of itself.
 
@@ -42,15 +87,21 @@ def verdict_of_run(look: Look | RigLook, motion: Motion, aside: Sequence[Mapping
     """
     cameras = len(look.cameras) if isinstance(look, RigLook) else 1
     of_motion = _cautions(motion, cameras, blind_frames(motion, aside, cameras))
-    return verdict_of(chain(_missing(*frames or (0, None)), of_motion, _without_cameras(aside, len(motion)), look.doubts))
+    return verdict_of(chain(_missing(*frames or (0, None)), of_motion, _without_cameras(aside, len(motion)), look.findings))
 
 
-def _missing(found: int, stated: int | None) -> Iterator[Caution]:
+def _brief(words: str, severity: int, **evidence: float | str) -> Finding:
+    """A finding whose sentence is short."""
+    return Finding.of(words, words, severity, **evidence)
+
+
+def _missing(found: int, stated: int | None) -> Iterator[Finding]:
     """A reason if the films have far fewer frames than they state."""
     share = 1 - found / stated if stated else 0.0
     if share > OFTEN_LOST:
-        yield Caution(f"{found} frames were read, but the film states {stated}: is it whole?",
-                      f"{found} of the film's {stated} frames: is it whole?", RUINOUS if share > MOSTLY_LOST else HARMFUL)
+        yield Finding.of("{read} frames were read, but the film states {stated}: is it whole?",
+                         "{read} of the film's {stated} frames: is it whole?", RUINOUS if share > MOSTLY_LOST else HARMFUL,
+                         read=found, stated=stated or 0)
 
 
 def lost_share(motion: Motion) -> float:
@@ -59,7 +110,7 @@ def lost_share(motion: Motion) -> float:
     return float(np.count_nonzero(motion.status == "lost") / present) if present else 0.0
 
 
-def blind_frames(motion: Motion, aside: Sequence[Mapping[str, Any]], cameras: int) -> NDArray[np.bool_]:
+def blind_frames(motion: Motion, aside: Sequence[SetAside], cameras: int) -> NDArray[np.bool_]:
     """Frames (T,) in which all cameras were blind, from the entry `set_aside` of metrics.json: no picture could have shown the person."""
     blind = np.zeros((cameras, len(motion)), bool)
     names = list(dict.fromkeys(one["camera"] for one in aside))
@@ -84,26 +135,26 @@ def _mean_error(deviations: NDArray[np.float64]) -> float:
     return float(np.where(np.isfinite(lengths), lengths, LOST_ERROR).mean())
 
 
-def _without_cameras(aside: Sequence[Mapping[str, Any]], frames: int) -> Iterator[Caution]:
+def _without_cameras(aside: Sequence[SetAside], frames: int) -> Iterator[Finding]:
     """A reason for each camera that was set aside, and why."""
     for camera, why in dict.fromkeys((one["camera"], one["why"]) for one in aside):
         times = [one for one in aside if (one["camera"], one["why"]) == (camera, why)]
-        short = f"camera {camera!r} {why} from {times[0]['from_s']:.1f} s: {REMEDIES[why]}"
-        yield Caution(short, short, HARMFUL if sum(one["frames"] for one in times) > OFTEN_LOST * frames else NOTED)
+        number = sum(one["frames"] for one in times)
+        yield _brief("camera {camera!r} {why} from {seconds:.1f} s: {remedy}", HARMFUL if number > OFTEN_LOST * frames else NOTED,
+                     camera=camera, why=why, seconds=times[0]["from_s"], remedy=REMEDIES[why], frames=number)
 
 
-def _cautions(motion: Motion, cameras: int, blind: NDArray[np.bool_]) -> Iterator[Caution]:
+def _cautions(motion: Motion, cameras: int, blind: NDArray[np.bool_]) -> Iterator[Finding]:
     if not (motion.status != "absent").any():
-        yield Caution("nobody was seen in any frame", "nobody was seen: film the empty scene and the person", RUINOUS)
+        yield Finding("nobody was seen in any frame", "nobody was seen: film the empty scene and the person", RUINOUS)
         return
     lost, kind = lost_share(motion), min(cameras, 2)
     if lost > OFTEN_LOST:
-        short = f"person lost in {100 * lost:.0f} % of frames: look at overlay.mp4 (--overlay)"
-        yield Caution(short, short, RUINOUS if lost > MOSTLY_LOST else HARMFUL)
+        yield _brief("person lost in {percent:.0f} % of frames: look at overlay.mp4 (--overlay)",
+                     RUINOUS if lost > MOSTLY_LOST else HARMFUL, percent=100 * lost)
     error = expected_error(motion, blind)
     if error > WIDE[kind]:
-        short = f"joints may be off by {1000 * error:.0f} mm on average"
-        yield Caution(short, short, RUINOUS if error > FAR[kind] else HARMFUL)
+        yield _brief("joints may be off by {mm:.0f} mm on average", RUINOUS if error > FAR[kind] else HARMFUL, mm=1000 * error)
     shares = {limb: float(np.isin(motion.limb_status[:, n], DOUBTFUL).mean()) for n, limb in enumerate(motion.limbs)}
     seen = (motion.status != "absent") & ~blind
     errors = {limb: _mean_error(motion.joint_sd[seen][:, joints]) for limb, joints in joints_of_limbs(motion.joint_names).items()}
@@ -111,9 +162,8 @@ def _cautions(motion: Motion, cameras: int, blind: NDArray[np.bool_]) -> Iterato
     at_times = [limb for limb, share in shares.items() if share > OFTEN_LOST and limb not in often]
     for limbs, weight in ((often, HARMFUL), (at_times, NOTED)):
         for named, least, most in _together(limbs, shares):
-            share = f"{least:.0f}" if round(least) == round(most) else f"{least:.0f} to {most:.0f}"
-            short = f"{named} doubtful in {share} % of frames"
-            yield Caution(short, short, weight)
+            share = "{least:.0f}" if round(least) == round(most) else "{least:.0f} to {most:.0f}"
+            yield _brief(f"{named} doubtful in {share} % of frames", weight, least=least, most=most)
 
 
 def _together(limbs: Sequence[str], shares: Mapping[str, float]) -> list[tuple[str, float, float]]:

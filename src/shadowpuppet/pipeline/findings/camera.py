@@ -11,16 +11,8 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import WHOLE
 from shadowpuppet.camera.mask import Mask, may_be_person
-from shadowpuppet.errors import HARMFUL, NOTED, Caution
-from shadowpuppet.pipeline.footage import FIRST, CameraFrame, Footage, Sample
-from shadowpuppet.pipeline.look import FirstSeconds, Look, Survey
-from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.people.census import count_in_picture
-from shadowpuppet.pipeline.progress import Listener, Steps
-from shadowpuppet.pipeline.rig import Rig
-from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes
-from shadowpuppet.pipeline.survey.cautions import (
-    GOOD,
+from shadowpuppet.errors import HARMFUL, NOTED, Finding
+from shadowpuppet.pipeline.findings.cautions import (
     clutter_cautions,
     condition_cautions,
     feet_cautions,
@@ -30,8 +22,14 @@ from shadowpuppet.pipeline.survey.cautions import (
     sitting_cautions,
     unlike_ready,
 )
-from shadowpuppet.pipeline.survey.film import FilmSurvey, mean_overlap, survey_film
-from shadowpuppet.silhouette.added import SceneHint
+from shadowpuppet.pipeline.findings.film import mean_overlap, survey_films
+from shadowpuppet.pipeline.findings.look import FilmSurvey, FirstSeconds, Look, Survey
+from shadowpuppet.pipeline.footage import FIRST, CameraFrame, Footage, Sample
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.people.census import count_in_picture
+from shadowpuppet.pipeline.progress import Listener, Steps
+from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes
 
 SHORT = 1.0
 """Length of a film, seconds, under which it is said to be short."""
@@ -42,16 +40,20 @@ UNEVEN = 0.1
 """Jitter over the frame interval above which the film's rate counts as variable."""
 
 
-def survey_camera(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), listener: Listener | None = None) -> Survey:
-    """Examine a recording of one camera; `hints` as in `survey_film`. Raises a `ShadowPuppetError` if something cannot be used."""
-    footage, steps = rig.footage[0], Steps(listener, rig.names, again=bool(hints))
-    film = survey_film(footage, options, hint=hints[0] if hints else SceneHint(), steps=steps)
+def survey_camera(rig: Rig, options: Options, listener: Listener | None = None, films: tuple[FilmSurvey, ...] = ()) -> Survey:
+    """Examine a recording of one camera; `films`: its film, if that was examined again. Raises a `ShadowPuppetError` if something cannot be
+    used."""
+    footage, steps = rig.footage[0], Steps(listener, rig.names, again=bool(films))
+    films = films or survey_films(rig, options, steps)
+    (film,) = films
     steps("silhouettes of the first seconds")
     look = _look(footage, film, options.tracker.body in WHOLE)
     if look.refusal and not options.anyway:
         return Survey(rig, (film.silhouettes,), (film.silhouettes,), FirstSeconds([], []), look)
     clean = clean_silhouettes(footage, film.sample, film.silhouettes, options)
-    return Survey(rig, (film.silhouettes,), (clean,), _first_people(film.sample, clean), look)
+    first = _first_people(film.sample, clean)
+    film.silhouettes.classified.forget()
+    return Survey(rig, (film.silhouettes,), (clean,), first, look, films=films)
 
 
 def _first_people(sample: Sample, clean: Silhouettes) -> FirstSeconds:
@@ -70,10 +72,10 @@ def _look(footage: Footage, film: FilmSurvey, whole: bool) -> Look:
     sample, camera = film.sample, footage.camera
     plain = [mask for frame in sample.frames if (mask := film.silhouettes.plain(frame)) is not None]
     look = Look(
-        recording=str(footage.recording.path), camera=camera.name, calibrated=camera.oriented, frames=footage.count,
-        looked_at=len(sample.times), rate=1 / sample.pace, jitter=sample.jitter, scale=known_scale(footage), area=_share(film.masks),
+        **vars(film.look), recording=str(footage.recording.path), camera=camera.name, calibrated=camera.oriented,
+        looked_at=len(sample.times), jitter=sample.jitter, scale=known_scale(footage), area=_share(film.masks),
         plain_area=_share(plain) if plain else None, exact_overlap_plain=mean_overlap(plain, film.exact),
-        refusal=recovery_doubt(film.silhouettes) or film.values["quality"].refusal(), **film.values,
+        refusal=recovery_doubt(film.silhouettes) or film.look.quality.refusal(),
     )  # fmt: skip
     if look.refusal:
         return look
@@ -81,15 +83,15 @@ def _look(footage: Footage, film: FilmSurvey, whole: bool) -> Look:
                else sitting_cautions(film.masks, [frame.time for frame in sample.frames]))
     doubts = (*_several_people(film), *posture, *_doubts(look, footage), *film_cautions(footage),
               *recovery_cautions([camera.name], [film.silhouettes]), *clutter_cautions(look.left_out))
-    return replace(look, doubts=(*doubts, *look.quality.warnings()))
+    return replace(look, findings=(*doubts, *look.quality.warnings()))
 
 
-def _several_people(film: FilmSurvey) -> list[Caution]:
+def _several_people(film: FilmSurvey) -> list[Finding]:
     number = count_in_picture(film.sample, film.silhouettes)
     if number < 2:
         return []
-    return [Caution(f"{number} people are in the picture: one camera tracks one, the nearest, who is the largest in the picture; two "
-                    "calibrated cameras or more track all", f"{number} people; the nearer one is tracked", HARMFUL)]
+    return [Finding.of("{people} people are in the picture: one camera tracks one, the nearest, who is the largest in the picture; two "
+                       "calibrated cameras or more track all", "{people} people; the nearer one is tracked", HARMFUL, people=number)]
 
 
 def known_scale(footage: Footage) -> str:
@@ -99,33 +101,31 @@ def known_scale(footage: Footage) -> str:
     return " and ".join(known) or f"average height of {AVERAGE_HEIGHT:.2f} m, assumed"
 
 
-def _doubts(look: Look, footage: Footage) -> list[Caution]:
-    doubts, subject = list[Caution](), footage.recording.subject
+def _doubts(look: Look, footage: Footage) -> list[Finding]:
+    doubts, subject = list[Finding](), footage.recording.subject
     if not look.calibrated:
-        doubts.append(Caution(f"no calibration: the camera is taken for level, with a field of view of {look.fov:.0f} degrees and no "
-                              "distortion; depths and the world's axes are as good as that; give a calibration.toml",
-                              "camera not calibrated: depths are rough; give --calibration", NOTED))
+        doubts.append(Finding.of("no calibration: the camera is taken for level, with a field of view of {fov:.0f} degrees and no "
+                                 "distortion; depths and the world's axes are as good as that; give a calibration.toml",
+                                 "camera not calibrated: depths are rough; give --calibration", NOTED, fov=look.fov))
     if not look.calibrated and look.size[0] < look.size[1] and look.fov > WIDE:
-        doubts.append(Caution(f"the film is upright: {look.fov:.0f} degrees are what a phone sees held across, held upright it sees about "
-                              f"{UPRIGHT:.0f} from left to right; with a wrong one all depths are wrong; give --fov {UPRIGHT:.0f}",
-                              f"upright film: --fov of a phone is then about {UPRIGHT:.0f}", NOTED))
+        doubts.append(Finding.of("the film is upright: {fov:.0f} degrees are what a phone sees held across, held upright it sees about "
+                                 "{upright:.0f} from left to right; with a wrong one all depths are wrong; give --fov {upright:.0f}",
+                                 "upright film: --fov of a phone is then about {upright:.0f}", NOTED, fov=look.fov, upright=UPRIGHT))
     if subject.height is None and subject.distance is None:
-        doubts.append(Caution(f"neither height nor distance is known: the {look.scale}, and all lengths are as wrong as that is; give "
+        doubts.append(Finding(f"neither height nor distance is known: the {look.scale}, and all lengths are as wrong as that is; give "
                               "--height", "height not known: all lengths are guesses; give --height", HARMFUL))
     elif subject.distance is None and not footage.recording.references:
-        doubts.append(Caution("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as "
+        doubts.append(Finding("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as "
                               "wrong as that; measure it and give --distance, or take references",
                               "distance not known: measure it, give --distance", NOTED if look.calibrated else HARMFUL))
     if look.frames is not None and look.frames < SHORT * look.rate:
-        seconds = f"{look.frames / look.rate:.1f} s"
-        doubts.append(Caution(f"the film has only {look.frames} frames ({seconds}): too few to measure the person well and to smooth the "
-                              "motion; film some seconds", f"film of {seconds} is very short: film some seconds", HARMFUL))
+        doubts.append(Finding.of("the film has only {frames} frames ({seconds:.1f} s): too few to measure the person well and to smooth "
+                                 "the motion; film some seconds", "film of {seconds:.1f} s is very short: film some seconds", HARMFUL,
+                                 frames=look.frames, seconds=look.frames / look.rate))
     if look.jitter * look.rate > UNEVEN:
-        doubts.append(Caution(f"the time from frame to frame varies by {100 * look.jitter * look.rate:.0f} %: the film's own times are "
-                              "kept", "frames come unevenly: their own times are kept", NOTED))
-    if look.exact_overlap is not None and look.exact_overlap < GOOD:
-        doubts.append(unlike_ready(look.exact_overlap))
-    return [*doubts, *condition_cautions(look.condition, footage.view.background is None)]
+        doubts.append(Finding.of("the time from frame to frame varies by {percent:.0f} %: the film's own times are kept",
+                                 "frames come unevenly: their own times are kept", NOTED, percent=100 * look.jitter * look.rate))
+    return [*doubts, *unlike_ready(look.exact_overlap), *condition_cautions(look.condition, footage.view.background is None)]
 
 
 def _share(masks: Sequence[Mask]) -> float:

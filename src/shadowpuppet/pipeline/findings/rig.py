@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 
 from shadowpuppet.calibration.agreement import SETS_COMPARED, Agreement, agreement
 from shadowpuppet.camera.mask import Seen, may_be_person
-from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Caution
+from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Finding
 from shadowpuppet.geometry import Array, evenly_spread
-from shadowpuppet.pipeline.footage import Footage
-from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, RigLook, Survey
-from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.people.census import Census, later_sets, sampled_sets, take_census
-from shadowpuppet.pipeline.progress import Listener, Steps
-from shadowpuppet.pipeline.rig import Rig
-from shadowpuppet.pipeline.survey.cautions import (
-    GOOD,
+from shadowpuppet.pipeline.findings.cautions import (
     clutter_cautions,
     condition_cautions,
     feet_cautions,
@@ -27,10 +19,15 @@ from shadowpuppet.pipeline.survey.cautions import (
     recovery_cautions,
     unlike_ready,
 )
-from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, of_several, survey_film
-from shadowpuppet.pipeline.survey.opening import OPENING, first_seconds, opening_of
-from shadowpuppet.silhouette.added import SceneHint
-from shadowpuppet.threads import one_opencv_thread, usable_cores
+from shadowpuppet.pipeline.findings.film import of_several, survey_films
+from shadowpuppet.pipeline.findings.look import CameraLook, FilmSurvey, FirstSeconds, RigLook, Survey
+from shadowpuppet.pipeline.findings.opening import OPENING, first_seconds, opening_of
+from shadowpuppet.pipeline.footage import Footage
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.people.census import Census, later_sets, sampled_sets, take_census
+from shadowpuppet.pipeline.progress import Listener, Steps
+from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.threads import one_opencv_thread
 from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 from shadowpuppet.tracking.people.views import View, views_of
 
@@ -45,16 +42,11 @@ RATES, LENGTHS = 0.02, 0.1
 
 
 @one_opencv_thread()
-def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), listener: Listener | None = None) -> Survey:
-    """Examine each camera's film, and the first seconds of all together; `hints` as in `survey_film`, by camera. Raises a
+def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, films: tuple[FilmSurvey, ...] = ()) -> Survey:
+    """Examine each camera's film, and the first seconds of all together; `films`: the films, if they were examined again. Raises a
     `ShadowPuppetError` if something cannot be used."""
-    steps, opening = Steps(listener, rig.names, again=bool(hints)), opening_of(rig)
-
-    def surveyed(footage: Footage, hint: SceneHint) -> FilmSurvey:
-        return survey_film(footage, options, brief_length(footage, options), hint, steps, opening)
-
-    with ThreadPoolExecutor(usable_cores(), "look") as pool:
-        films = list(pool.map(surveyed, rig.footage, hints or [SceneHint()] * len(rig.footage)))
+    steps = Steps(listener, rig.names, again=bool(films))
+    apart = films = films or survey_films(rig, options, steps)
     silhouettes = tuple(film.silhouettes for film in films)
     census, spread, wide = None, list[Seen](), tuple(each.of_several() for each in silhouettes)
     if any(_shows_person(film) for film in films):
@@ -65,10 +57,10 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
         census, spread = take_census(rig.cameras, sampled, later), [*sampled, *later]
     several = census.number if census is not None and census.number > 1 else 0
     if several:
-        films = [of_several(film) for film in films]
+        films = tuple(map(of_several, films))
         silhouettes = tuple(film.silhouettes for film in films)
     steps("silhouettes of the first seconds in all films")
-    first = first_seconds(rig, silhouettes, [film.sample for film in films], opening, options.masks)
+    first = first_seconds(rig, silhouettes, [film.sample for film in films], opening_of(rig), options.masks)
     steps("do the cameras agree")
     agree = _agreement_of_people(rig, census, first) if census is not None and several else _agreement_of_one(rig, first, spread)
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
@@ -78,10 +70,12 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     doubts += [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
     if several:
-        doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
-                                 f"{several} people: each is tracked", NOTED))
-    look = replace(look, refusal=refusal, doubts=() if refusal else tuple(doubts))
-    return Survey(rig, silhouettes, silhouettes, first, look, census)
+        doubts.insert(0, Finding.of("{people} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
+                                    "{people} people: each is tracked", NOTED, people=several))
+    look = replace(look, refusal=refusal, findings=() if refusal else tuple(doubts))
+    for each in silhouettes:
+        each.classified.forget()
+    return Survey(rig, silhouettes, silhouettes, first, look, census, apart)
 
 
 def _agreement_of_one(rig: Rig, first: FirstSeconds, spread: Sequence[Seen] = ()) -> Agreement:
@@ -130,8 +124,8 @@ def _shows_person(film: FilmSurvey) -> bool:
 
 def _camera_look(footage: Footage, film: FilmSurvey) -> CameraLook:
     x, y, z = footage.view.camera.centre.tolist()
-    rate = 1 / film.sample.pace if len(film.sample.times) > 1 else footage.film.rate
-    return CameraLook(name=footage.camera.name, place=(x, y, z), frames=footage.count, rate=rate, start=footage.view.start, **film.values)
+    look = film.look if len(film.sample.times) > 1 else replace(film.look, rate=footage.film.rate)
+    return CameraLook(**vars(look), name=footage.camera.name, place=(x, y, z), start=footage.view.start)
 
 
 def _rig_refusal(look: RigLook, first: FirstSeconds) -> str | None:
@@ -157,32 +151,32 @@ def _odd(rates: Array, look: RigLook) -> str:
     return f"camera {odd[0]!r} is" if len(odd) == 1 else f"cameras {', '.join(odd[:3])} are"
 
 
-def _rig_doubts(look: RigLook, several: bool = False, recovered: frozenset[str] = frozenset()) -> list[Caution]:
+def _rig_doubts(look: RigLook, several: bool = False, recovered: frozenset[str] = frozenset()) -> list[Finding]:
     """Doubts about a rig; of `several` people the quality of silhouettes, which supposes one, says nothing; silhouettes against an empty
     scene that was `recovered` from the films of these cameras may themselves be why the cameras do not fit together."""
     unclear = bool(recovered) and look.agreement.remedy is None
-    doubts = [Caution(doubt, SILHOUETTES_OR_CAMERAS, RUINOUS) if unclear and doubt.weight == RUINOUS else doubt
+    doubts = [replace(doubt, short=SILHOUETTES_OR_CAMERAS) if unclear and doubt.severity == RUINOUS else doubt
               for doubt in look.agreement.doubts()]
     rates = np.array([camera.rate for camera in look.cameras])
     ends = {camera.name: camera.frames / camera.rate for camera in look.cameras if camera.frames is not None}
     if np.ptp(rates) > RATES * rates.min():
         listed = ", ".join(f"{camera.name} {camera.rate:.4g}" for camera in look.cameras)
-        doubts.append(Caution(f"the films have different rates (frames/s: {listed}): they are aligned by their times, {look.rate:.4g} sets "
-                              "a second, and a camera without a picture of a moment is left out of it; film at one rate",
-                              f"{_odd(rates, look)} of another frame rate: film at one", NOTED))
+        doubts.append(Finding.of("the films have different rates (frames/s: {listed}): they are aligned by their times, {sets:.4g} sets a "
+                                 "second, and a camera without a picture of a moment is left out of it; film at one rate",
+                                 "{odd} of another frame rate: film at one", NOTED, listed=listed, sets=look.rate, odd=_odd(rates, look)))
     elif ends and max(ends.values()) - min(ends.values()) > LENGTHS and not any(camera.start for camera in look.cameras):
         listed = ", ".join(f"{name} {end:.2f}" for name, end in ends.items())
-        doubts.append(Caution(f"the films have different lengths (s: {listed}): were they begun together? say in [start] of recording.toml "
-                              "when each began", "films differ in length: begun together? see [start]", NOTED))
+        doubts.append(Finding.of("the films have different lengths (s: {listed}): were they begun together? say in [start] of "
+                                 "recording.toml when each began", "films differ in length: begun together? see [start]", NOTED,
+                                 listed=listed))
     whole = sum(not camera.quality.cut_off and not camera.quality.refusal() for camera in look.cameras)
     if not several:
         doubts += feet_cautions({camera.name: camera.quality.border["bottom"] for camera in look.cameras if not camera.quality.refusal()})
     for camera in look.cameras:
-        if camera.exact_overlap is not None and camera.exact_overlap < GOOD:
-            doubts.append(unlike_ready(camera.exact_overlap).about(f"camera {camera.name!r}"))
+        doubts += [unlike.about(f"camera {camera.name!r}") for unlike in unlike_ready(camera.exact_overlap)]
         quality = () if several else camera.quality.warnings(whole >= ENOUGH)
         warnings = (*condition_cautions(camera.condition, camera.name in recovered), *clutter_cautions(camera.left_out), *quality)
         doubts += [warning.about(f"camera {camera.name!r}").at_most(HARMFUL) for warning in warnings]
-        doubts += [Caution(f"camera {camera.name!r}: {why}", f"camera {camera.name!r} shows no usable silhouette", HARMFUL)
+        doubts += [Finding(f"camera {camera.name!r}: {why}", f"camera {camera.name!r} shows no usable silhouette", HARMFUL)
                    for why in [camera.quality.refusal()] if why]
     return doubts

@@ -1,0 +1,1 @@
+"""What is found of a recording before a run, and of the run: figures, severity and words."""

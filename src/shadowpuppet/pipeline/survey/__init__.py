@@ -1,1 +1,0 @@
-"""A recording examined before a run."""
