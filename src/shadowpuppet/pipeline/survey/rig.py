@@ -15,7 +15,7 @@ from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.look import CameraLook, FirstSeconds, RigLook, Survey
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.people.census import Census, later_sets, sampled_sets, take_census
+from shadowpuppet.pipeline.people.census import Census, are_apart, later_sets, sampled_sets, take_census
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.survey.cautions import (
@@ -63,6 +63,9 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
         share = SharedShadows(rig.cameras)
         sampled, later = sampled_sets([film.sample for film in films], wide, share), later_sets(rig, wide, float(seen), share)
         census, spread = take_census(rig.cameras, sampled, later), [*sampled, *later]
+    counted = census.number if census is not None else 0
+    if census is not None and options.people is not None and not (options.people == 1 < counted and are_apart(spread)):
+        census = replace(census, number=options.people)
     several = census.number if census is not None and census.number > 1 else 0
     if several:
         films = [of_several(film) for film in films]
@@ -77,9 +80,12 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     recovered = frozenset(camera.name for camera, each in zip(look.cameras, silhouettes, strict=True) if each.recovered is not None)
     doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     doubts += [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
-    if several:
+    if several and options.people != 1:
         doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
                                  f"{several} people: each is tracked", NOTED))
+    elif counted > 1:
+        doubts.insert(0, Caution(f"{counted} people were counted; one is tracked, others are ignored (--people 1)",
+                                 f"{counted} people: one is tracked, others are ignored", NOTED))
     look = replace(look, refusal=refusal, doubts=() if refusal else tuple(doubts))
     return Survey(rig, silhouettes, silhouettes, first, look, census)
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes
-from shadowpuppet.motion.motion import BLANK, PER_FRAME, Motion
-from shadowpuppet.tracking.people.facing import refitted
+from shadowpuppet.geometry import Array
+from shadowpuppet.motion.inverse_kinematics import fit_poses
+from shadowpuppet.motion.motion import BLANK, PER_FRAME, JointTable, Motion
 from shadowpuppet.tracking.people.identity import Exchange
 
 
@@ -28,6 +29,14 @@ def given_back(motions: Mapping[int, Motion], exchanges: Sequence[Exchange],
             out |= {one: _with_frames(out[one], mine, out[other], theirs, *people[one]),
                     other: _with_frames(out[other], theirs, out[one], mine, *people[other])}  # fmt: skip
     return out
+
+
+def refitted(motion: Motion, joints: Array, frames: NDArray[np.bool_], body: Body, sizes: BoneSizes) -> tuple[Array, Array]:
+    """Poses (T, D) and joints (T, J, 3) of a motion in which those of some frames (T,) are the body's nearest to given `joints`."""
+    poses, joints = motion.poses.copy(), joints.copy()
+    fitted = fit_poses(JointTable(motion.times[frames], motion.joint_names, joints[frames]), body.name, sizes, any_bend=True)
+    poses[frames], joints[frames] = fitted.poses, body.points(fitted.poses)
+    return poses, joints
 
 
 def _with_frames(motion: Motion, frames: NDArray[np.int64], other: Motion, theirs: NDArray[np.int64], body: Body,
