@@ -128,6 +128,17 @@ def test_a_person_is_followed_both_ways_until_one_is_better_from_the_side(seen, 
     assert {frame.status for frame in front.decided} == ({"lost" if turned else "tracked"} if known else set())
 
 
+def test_the_first_moments_and_a_single_frame_tell_nothing(seen):
+    seen.other = 0.3
+    front, _ = seen.followed(Front().begun(is_known=False), SETTLING - 0.02)
+    seen.other = 0.75
+    front, _ = seen.followed(front, 0.5)
+    assert not front.is_known
+    seen.other = 0.3
+    front, _ = seen.followed(front, 2 / RATE)
+    assert not front.is_known
+
+
 def test_average_sizes_fit_too_alike_to_tell(seen):
     seen.other = 0.6
     assert not seen.followed(Front().begun(is_known=False), 3.0, fit_tells=False)[0].is_known

@@ -24,6 +24,8 @@ MEMORY = 1.0
 """Time (s) in which the odds fall to 1/e."""
 PER_OVERLAP, PER_METRE = 180.0, 7.0
 """Log odds of a body that fits better by an overlap of 1 for a second; of a metre walked forwards."""
+PER_FRAME = 1.0
+"""Greatest log odds that the overlaps of one frame add: it may be a bad one."""
 SETTLING = 0.4
 """Time (s) that a body turned round takes to settle: its overlap does not count before."""
 QUICK, TURN = 0.7, np.radians(110)
@@ -109,15 +111,17 @@ def face(front: Front, tracker: MultiviewTracker, rng: np.random.Generator, shar
         return front, share.state
     if front.other is None:
         other = turn_round(tracker, rng, share)
-        odds = front.odds + (PER_OVERLAP * MEMORY * lead(share.state, other) if is_quick else 0.0)
-        if is_quick and front.is_known and odds < 0 and other.status != "lost":
+        doubt = PER_OVERLAP * MEMORY * lead(share.state, other) if front.is_known or is_quick else 0.0
+        odds = float(np.clip(front.odds + doubt, -MOST, MOST))
+        if front.is_known and odds < 0 and other.status != "lost":
             return front.found(wrong=True), other
-        front = front._replace(odds=float(np.clip(odds, -MOST, MOST)) if is_quick else odds, is_known=False, other=other, since=time)
+        front = front._replace(odds=odds, is_known=False, other=other, since=time)
     else:
         other = follow_turned(tracker, rng, front.other, share)
         front = front._replace(other=other)
         if fit_tells and time - front.since >= SETTLING and shows_side(tracker, share):
-            front = front._replace(odds=front.odds + PER_OVERLAP * seconds * lead(share.state, other))
+            told = float(np.clip(PER_OVERLAP * seconds * lead(share.state, other), -PER_FRAME, PER_FRAME))
+            front = front._replace(odds=front.odds + told)
     if abs(front.odds) < KNOWN or time - front.since < SETTLING:
         return front, share.state
     return front.found(front.odds < 0), other if front.odds < 0 else share.state
