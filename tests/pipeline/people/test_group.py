@@ -31,7 +31,7 @@ def at(place: np.ndarray, status: str = "tracked") -> MultiviewState:
     return MultiviewState(np.asarray(place), np.zeros(2), None, 0.0, 0.8, status)
 
 
-class Followed(Group):
+class Dressed(Group):
     """A group in whose pictures people wear what stands by the x of their place."""
 
     worn: dict[float, int]
@@ -76,8 +76,8 @@ def scene(monkeypatch):
     monkeypatch.setattr(module, "place_of", lambda body, state: state.pose)
     monkeypatch.setattr(module, "step", step)
     monkeypatch.setattr(module, "start", lambda tracker, rng, one, *given: Begun(at(one.place), now.sided))
-    now.group = Followed(None, None, fit, lambda measured: SimpleNamespace(tracker=None, body=None))
-    now.people, now.time = PeopleState(), 0.0
+    now.group = Dressed(None, None, fit, lambda measured: SimpleNamespace(tracker=None, body=None))
+    now.people, now.time = PeopleState(is_begun=True), 0.0
 
     def run(seconds: float, *figures: Figure) -> list[int]:
         now.figures = list(figures)

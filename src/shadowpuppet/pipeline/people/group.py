@@ -72,6 +72,8 @@ class Group:
 
     def next(self, people: PeopleState, frames: Frames) -> PeopleState:
         """The people after one more frame set."""
+        if not people.is_begun and len(frames.points.points):
+            people = self.start(people, frames)._replace(is_begun=True)
         after = self._tracked(people, frames)
         if frames.time >= people.due:
             after = self._looked(after._replace(due=frames.time + LOOK_SECONDS), frames)

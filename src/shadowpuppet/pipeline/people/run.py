@@ -79,8 +79,6 @@ class Carried(NamedTuple):
     """Number of frames of each person, by their numbers; 0 for one without a run so far."""
     clear: NDArray[np.bool_]
     """For each frame set, whether cameras could be judged in it."""
-    begun: bool
-    """Whether the first people have been looked for."""
     people: PeopleState
 
 
@@ -178,7 +176,7 @@ class PeopleRun:
         look = survey.look
         assert isinstance(look, RigLook)
         rate = look.rate if np.isfinite(look.rate) else FALLBACK_RATE
-        watch, begun = RigWatch(len(self.rig.footage), self.rig.short), carried is not None and carried.begun
+        watch = RigWatch(len(self.rig.footage), self.rig.short)
         self.listener.begin("tracking", tracked(look.frames, options.every))
         began = time.perf_counter()
         write_beside(self.folder, look, self.rig)
@@ -209,15 +207,12 @@ class PeopleRun:
                     if points is None or not all(map(operator.is_, seen.masks, now.seen.masks)):
                         points = group.hull.points(seen.masks)
                 with timer.time("track"):
-                    shown = Frames(now.time, points, seen, now.corrected if options.appearance else ())
-                    if not begun and len(points.points):
-                        begun, people = True, group.start(people, shown)
-                    people = group.next(people, shown)
+                    people = group.next(people, Frames(now.time, points, seen, now.corrected if options.appearance else ()))
                 with timer.time("write"):
                     found = self._write(group, people, stack, places)
                     clear.append(people.is_clear)
                     judged(now, found, clear[-1])
-                    checkpoints.keep(partial(self._keep, people, places, clear, begun))
+                    checkpoints.keep(partial(self._keep, people, places, clear))
                 self.listener.advance(len(clear))
         finally:
             self.sets = len(clear)
@@ -225,10 +220,10 @@ class PeopleRun:
             self.metrics |= timings(timer, STAGES, count, time.perf_counter() - began) | set_aside(watch.intervals, self.rig.names)
         return people
 
-    def _keep(self, people: PeopleState, places: BinaryIO, clear: Sequence[bool], begun: bool) -> None:
+    def _keep(self, people: PeopleState, places: BinaryIO, clear: Sequence[bool]) -> None:
         """Write a checkpoint."""
         numbers = tuple(len(self.writers[each.number]) if each.number in self.writers else 0 for each in people.people)
-        self.writer.checkpoint(Carried(json_text(self.survey.look), places.tell(), numbers, np.array(clear), begun, people.kept()))
+        self.writer.checkpoint(Carried(json_text(self.survey.look), places.tell(), numbers, np.array(clear), people.kept()))
 
     def _earlier(self, group: Group, people: PeopleState, carried: Carried | None,
                  stack: ExitStack) -> list[tuple[dict[int, MotionFrame], bool]]:

@@ -108,6 +108,8 @@ class PeopleState(NamedTuple):
     """Figures that no body explains."""
     sets: int = 0
     """Number of frame sets so far."""
+    is_begun: bool = False
+    """Whether the first people have been looked for, in a frame set that shows any."""
     due: float = -np.inf
     """When people are looked for again, seconds."""
     identity: Identity = Identity()
