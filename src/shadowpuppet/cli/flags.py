@@ -20,7 +20,7 @@ RUN, PERSON, CAMERAS, SCENE, PICTURES, LIVE, PROGRAMS, LEARNING, OTHER = (Group(
 """Headings of `--help`."""
 GROUPS = {
     **dict.fromkeys(("preset", "seed", "smooth", "cutoff", "gaps", "overlay", "anyway"), RUN),
-    **dict.fromkeys(("height", "distance", "facing", "body", "person", "prior", "appearance"), PERSON),
+    **dict.fromkeys(("height", "distance", "facing", "body", "person", "prior", "people", "appearance"), PERSON),
     **dict.fromkeys(("rate", "delay", "speed", "countdown", "learn", "still", "show", "listen", "port", "lag", "record"), LIVE),
     **dict.fromkeys(("osc", "websocket", "origin", "lsl", "lsl_scope"), PROGRAMS),
     **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "label", "region", "start", "end", "max_size", "every"),

@@ -38,7 +38,8 @@ if TYPE_CHECKING:
 
     DemoFlags = SessionFlags = LiveFlags = Any
 else:
-    KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "start", "end", "max_size", "every", "overlay", "appearance")
+    KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "start", "end", "max_size", "every", "overlay", "people",
+             "appearance")
     DemoFlags = unpacked(flags_of(Options, without=KNOWN))
     """Options for recordings that are known."""
     SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "label", "every", "overlay", "facing", "appearance", "training")))
@@ -161,7 +162,7 @@ def live(camera: Annotated[str | None, Parameter(help="The camera, or a film to 
 
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.live.display.view import open_display
-    from shadowpuppet.live.run import run_live
+    from shadowpuppet.live.run import check_number, run_live
     from shadowpuppet.live.stream.choice import open_outlets
     from shadowpuppet.viewer.web.live import SpaceDisplay
 
@@ -169,6 +170,7 @@ def live(camera: Annotated[str | None, Parameter(help="The camera, or a film to 
     if camera is not None and asked.setdefault("camera", camera) != camera:
         raise SettingsError(f"camera: found {camera} and --camera {asked['camera']}, expected one of them")
     options, chosen = options_from(flags, config), validate(LiveSettings, asked, "flags")
+    check_number(options)  # before a display is opened
     folder = folder or Path(strftime("live-%Y%m%d-%H%M%S"))
     _check_earlier(folder, force, resumes=False)
     with terminal(quiet, folder) as listener:

@@ -162,6 +162,16 @@ class RunWriter:
         self._keep_inputs()
         return None
 
+    def adopt(self, only: RunWriter) -> None:
+        """Make the run of the only one of several people that was followed this run, in this folder. Raises `ShadowPuppetError`."""
+        with self._system_errors():
+            for path in only.folder.iterdir():
+                if path.name in (*FILES, RAW):
+                    path.replace(self.folder / path.name)
+            remove_people(self.folder, (*FILES, "run.toml", LOCK))
+        self._motion = only._motion
+        self.info = {key: value for key, value in only.info.items() if key != "person"}
+
     def resumed(self, types: Iterable[type]) -> tuple[Any, list[MotionFrame]] | None:
         """The state that the last `checkpoint` of the earlier run got, and its frames until then, from which `begin` goes on; None if the
         run begins at the start. `types`: the named tuples in the state. Raises `FormatError` for a damaged checkpoint."""

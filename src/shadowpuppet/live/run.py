@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from shadowpuppet.errors import SettingsError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import read_run
@@ -49,6 +50,13 @@ class _Nobody(Exception):
     """Nobody was tracked, so there is no run to keep."""
 
 
+def check_number(options: Options) -> None:
+    """Raise `SettingsError` for several people."""
+    if (options.people or 1) > 1:
+        raise SettingsError(f"people: found {options.people} for a live session, expected 1: `track` follows several, also in what "
+                            "--record has kept")
+
+
 @one_blas_thread()
 def run_live(folder: str | Path, options: Options | None = None, settings: LiveSettings | None = None,
              listener: LiveListener | None = None, display: Display | None = None,
@@ -62,6 +70,7 @@ def run_live(folder: str | Path, options: Options | None = None, settings: LiveS
     options, settings = options or Options(), settings or LiveSettings()
     listener, display = listener or LiveListener(), display or Display()
     outlets = outlets or Outlets()
+    check_number(options)
     several = is_rig(settings.camera)
     body = average_body((options.multiview if several else options.tracker).body)
     told = validate(LiveSettings, asdict(settings) | {"camera": without_secrets(settings.camera)})

@@ -20,7 +20,7 @@ from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.rig import FrameSet, Rig
 
 SHARED = ("height", "distance", "fov", "calibration", "camera", "background", "masks", "region", "start", "end", "max_size",
-          "every", "silhouette")
+          "every", "people", "silhouette")
 """Options on which survey and silhouettes depend."""
 LIMIT = 256_000_000
 """Greatest size of the kept silhouettes, bytes: about half an hour of one camera's 25 frames/s at 320 x 240."""

@@ -24,7 +24,7 @@ from shadowpuppet.pipeline.findings.look import CameraLook, FilmSurvey, FirstSec
 from shadowpuppet.pipeline.findings.opening import OPENING, first_seconds, opening_of
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.people.census import Census, later_sets, sampled_sets, take_census
+from shadowpuppet.pipeline.people.census import Census, are_apart, later_sets, sampled_sets, take_census
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.threads import one_opencv_thread
@@ -55,6 +55,9 @@ def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, fil
         share = SharedShadows(rig.cameras)
         sampled, later = sampled_sets([film.sample for film in films], wide, share), later_sets(rig, wide, float(seen), share)
         census, spread = take_census(rig.cameras, sampled, later), [*sampled, *later]
+    counted = census.number if census is not None else 0
+    if census is not None and options.people is not None and not (options.people == 1 < counted and are_apart(spread)):
+        census = replace(census, number=options.people)
     several = census.number if census is not None and census.number > 1 else 0
     if several:
         films = tuple(map(of_several, films))
@@ -69,9 +72,12 @@ def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, fil
     recovered = frozenset(camera.name for camera, each in zip(look.cameras, silhouettes, strict=True) if each.recovered is not None)
     doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     doubts += [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
-    if several:
+    if several and options.people != 1:
         doubts.insert(0, Finding.of("{people} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
                                     "{people} people: each is tracked", NOTED, people=several))
+    elif counted > 1:
+        doubts.insert(0, Finding.of("{people} people were counted; one is tracked, others are ignored (--people 1)",
+                                    "{people} people: one is tracked, others are ignored", NOTED, people=counted))
     look = replace(look, refusal=refusal, findings=() if refusal else tuple(doubts))
     for each in silhouettes:
         each.classified.forget()
