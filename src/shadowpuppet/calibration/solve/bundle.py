@@ -141,7 +141,7 @@ def _result(bundle: Bundle, residuals: Array, jacobian: csr_array, scale: float,
     place, angle, delay, lens = np.zeros(C), np.zeros(C), np.zeros(C), np.zeros(C)
     if columns.total:
         H, _ = _normal(jacobian, residuals, scale)
-        covariance = _covariance(H, columns.shared)
+        covariance = _covariance(H, columns)
         for c, camera in enumerate(bundle.cameras):
             if (k := columns.places[c]) >= 0:
                 # centre = -R' t: with R <- exp(w) R and t <- t + d it moves by -R' (d + t x w)
@@ -285,12 +285,13 @@ def _normal(jacobian: csr_array, residuals: Array, scale: float) -> tuple[csc_ar
     return (weighted.T @ jacobian).tocsc(), np.asarray(weighted.T @ residuals.ravel(), float)
 
 
-def _covariance(H: csc_array, first: int) -> Array:
-    """Covariance (first, first) of the columns that are not boards', which are taken out (Schur's complement); infinite where the
-    observations say nothing."""
+def _covariance(H: csc_array, columns: _Columns) -> Array:
+    """Covariance of the columns that are not boards', which are taken out (Schur's complement); infinite where the observations say
+    nothing."""
+    first = columns.shared
     S = H[:first, :first].toarray()
     try:
-        if H.nnz and first < len(H.indptr) - 1:
+        if first < columns.total:
             S = S - H[:first, first:] @ splu(H[first:, first:]).solve(H[first:, :first].toarray())
         return np.asarray(np.linalg.pinv(S, hermitian=True), float)
     except (RuntimeError, np.linalg.LinAlgError):  # singular
