@@ -7,7 +7,7 @@ little changes its signal by a nearly constant angle, which is removed: this sep
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -230,14 +230,10 @@ def _solved(count: int, shifts: Sequence[_Shift]) -> tuple[Array, Array]:
 
 def _linked(count: int, shifts: Sequence[_Shift]) -> tuple[list[int], list[_Shift]]:
     """The largest group of films whose offsets can be compared, in order, and the shifts between them."""
-    others = {n: {shift.first + shift.second - n for shift in shifts if n in shift[:2]} for n in range(count)}
-    group = max((_reached(n, others) for n in range(count) if others[n]), key=len, default=set())
-    return sorted(group), [shift for shift in shifts if shift.first in group]
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
 
-
-def _reached(film: int, others: Mapping[int, set[int]]) -> set[int]:
-    group, edge = {film}, {film}
-    while edge:
-        edge = {other for n in edge for other in others[n]} - group
-        group |= edge
-    return group
+    links = csr_array((np.ones(len(shifts)), np.array([shift[:2] for shift in shifts], int).reshape(-1, 2).T), shape=(count, count))
+    _, number = connected_components(links, directed=False)
+    group = np.flatnonzero(number == np.bincount(number).argmax()).tolist()
+    return group, [shift for shift in shifts if shift.first in group]
