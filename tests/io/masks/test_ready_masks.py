@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
-
 import cv2
 import numpy as np
 import pytest
+from png import palette_png
 
 from shadowpuppet.errors import SilhouetteError, VideoError
 from shadowpuppet.io.masks.ready_masks import mask_kind, open_masks
@@ -24,16 +22,6 @@ def person(n: int, top: int = 8) -> np.ndarray:
     if n > 2:
         out[top : top + 20, 10 + n : 20 + n] = True
     return out
-
-
-def palette_png(places: np.ndarray, palette: tuple[int, ...], opacity: tuple[int, ...] = ()) -> bytes:
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    rows = b"".join(b"\0" + row.tobytes() for row in places.astype(np.uint8))
-    head = struct.pack(">IIBBBBB", *places.shape[::-1], 8, 3, 0, 0, 0)
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"PLTE", bytes(palette))
-            + (chunk(b"tRNS", bytes(opacity)) if opacity else b"") + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 
 
 def png(image: np.ndarray) -> bytes:
