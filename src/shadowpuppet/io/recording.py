@@ -17,9 +17,9 @@ from shadowpuppet.io.calibration.formats import find_calibration
 from shadowpuppet.io.picture_sizes import check_sizes, without_padding
 from shadowpuppet.io.projects import Project, films_in, find_project, sources_in
 from shadowpuppet.io.recording_toml import RecordingNotes
+from shadowpuppet.io.shared_rate import shared_rate
 from shadowpuppet.names import composed, spelled_as
 from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES, camera_number, open_frames
-from shadowpuppet.video.film import is_steady
 
 POSTURES = ("front_t_pose", "side_arms_hanging", "front_arms_t_pose")
 """Reference postures of Liu 2011's initialisation, for O1, O2 and O3 (IV-A)."""
@@ -27,8 +27,6 @@ BOARD_FOLDERS = ("intrinsics", "extrinsics", "floor")
 """Folders of films of a board, from which cameras are calibrated."""
 RATES = (0.1, 10_000.0)
 """Limits of `rate`, frames/s."""
-LIKE, APART = 0.1, 0.5
-"""Greatest relative difference of the rates of films in step by number, and least number of frames by which these rates part them."""
 STARTS, DURATIONS = (0.0, 100_000.0), (1e-3, 1e6)
 """Limits of `start` and `duration`, seconds."""
 
@@ -219,25 +217,7 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
     recording = Recording(folder, folder.resolve().name, views, Subject(height, distance), references, truth, training, rate, duration,
                           truths=_truths(folder))
     recording = recording if project is None else _with_facts(recording, project)
-    return recording if starts else _in_step(recording)
-
-
-def _in_step(recording: Recording) -> Recording:
-    """The recording at one rate, with a warning, if its films have equal numbers of frames and slightly different, steady rates: programs
-    that record several cameras in step write what each camera measured as its rate."""
-    sources = [view.video for view in recording.views]
-    if recording.rate is not None or len(sources) < 2 or not all(isinstance(each, Path) and each.is_file() for each in sources):
-        return recording
-    films = [open_frames(each) for each in sources]
-    number, rates = films[0].count, sorted(film.rate for film in films)
-    if not number or any(film.count != number for film in films) or not 0 < (1 - rates[0] / rates[-1]) <= LIKE:
-        return recording
-    if number * (1 - rates[0] / rates[-1]) < APART or not all(is_steady(Path(str(each))) for each in sources):
-        return recording
-    rate = rates[(len(rates) - 1) // 2]
-    warn(f"{recording.path}: the films have {number} frames each at {rates[0]:.4g} to {rates[-1]:.4g} frames/s: they are taken to be in "
-         f"step by number, at {rate:.4g} frames/s; if they are not, say in [start] of recording.toml when each began")
-    return replace(recording, rate=rate)
+    return recording if starts or recording.rate is not None else replace(recording, rate=shared_rate(folder, [v.video for v in views]))
 
 
 def _in_order(cameras: tuple[Camera, ...], films: dict[str, Any], project: Project) -> tuple[Camera, ...]:

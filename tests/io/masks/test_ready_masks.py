@@ -77,6 +77,22 @@ def test_of_several_labels_one_is_chosen(tmp_path, form):
         np.testing.assert_array_equal(frame.image > 0, person(n))
 
 
+def test_a_label_that_no_mask_has_is_named(tmp_path):
+    for n in range(NUMBER):
+        (tmp_path / f"{n:02d}.png").write_bytes(png(3 * person(n).astype(np.uint8) + 2 * (n == 7) * np.roll(person(n), -9, 1)))
+    assert mask_kind(tmp_path, 3).person == 3
+    with pytest.raises(SilhouetteError, match="label: found 9, which is in no mask, expected "):
+        mask_kind(tmp_path, 9)
+    with pytest.raises(SilhouetteError, match="label: found 0, which is the background, expected "):
+        mask_kind(tmp_path, 0)
+
+
+def test_a_label_that_few_masks_have_is_found(tmp_path):
+    for n in range(60):
+        (tmp_path / f"{n:02d}.png").write_bytes(png((1 + 3 * (n == 31)) * person(9).astype(np.uint8)))
+    assert mask_kind(tmp_path, 4).person == 4
+
+
 @pytest.mark.parametrize("inverted", [False, True])
 @pytest.mark.parametrize("number", [NUMBER, 60])
 def test_films_of_masks_may_be_black_on_white(tmp_path, inverted, number):
