@@ -15,7 +15,7 @@ from shadowpuppet.errors import RecordingError, choices, reason, typed, warn
 from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, read_calibration
 from shadowpuppet.io.calibration.formats import find_calibration
 from shadowpuppet.io.picture_sizes import check_sizes, without_padding
-from shadowpuppet.io.projects import Project, films_in, find_project, sources_in
+from shadowpuppet.io.projects import RATES, Project, films_in, find_project, sources_in
 from shadowpuppet.io.recording_toml import RecordingNotes
 from shadowpuppet.io.shared_rate import shared_rate
 from shadowpuppet.names import composed, spelled_as
@@ -25,8 +25,6 @@ POSTURES = ("front_t_pose", "side_arms_hanging", "front_arms_t_pose")
 """Reference postures of Liu 2011's initialisation, for O1, O2 and O3 (IV-A)."""
 BOARD_FOLDERS = ("intrinsics", "extrinsics", "floor")
 """Folders of films of a board, from which cameras are calibrated."""
-RATES = (0.1, 10_000.0)
-"""Limits of `rate`, frames/s."""
 STARTS, DURATIONS = (0.0, 100_000.0), (1e-3, 1e6)
 """Limits of `start` and `duration`, seconds."""
 

@@ -27,6 +27,7 @@ from shadowpuppet.pipeline.survey.cautions import (
     recovery_cautions,
     unlike_ready,
 )
+from shadowpuppet.pipeline.survey.delays import delay_cautions
 from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, of_several, survey_film
 from shadowpuppet.pipeline.survey.opening import OPENING, first_seconds, opening_of
 from shadowpuppet.silhouette.added import SceneHint
@@ -77,6 +78,9 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     recovered = frozenset(camera.name for camera, each in zip(look.cameras, silhouettes, strict=True) if each.recovered is not None)
     doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     doubts += [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
+    if not (refusal or several or agree.doubts()):
+        steps("do the films begin together")
+        doubts += delay_cautions(rig, silhouettes, first, options.masks)
     if several:
         doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
                                  f"{several} people: each is tracked", NOTED))

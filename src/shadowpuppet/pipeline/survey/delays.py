@@ -1,0 +1,51 @@
+"""Do the films of several cameras begin together: by silhouettes of consecutive sets, before a run."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+
+from shadowpuppet.calibration.silhouettes import Row, silhouettes_of
+from shadowpuppet.calibration.time_offset import certain_offsets, delays_in_words, time_offsets
+from shadowpuppet.errors import HARMFUL, Caution, ShadowPuppetWarning
+from shadowpuppet.pipeline.look import FirstSeconds
+from shadowpuppet.pipeline.rig import Rig, synchronized_frames
+from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.pipeline.survey.opening import opening_of
+from shadowpuppet.threads import usable_cores
+
+SECONDS, SETS = 3.0, 60
+"""Length (s) of the film's middle that is read where the person stands still at first, and greatest number of sets of it."""
+LEAST = 1.0
+"""Frames by which a film must be late for the recording to be in doubt."""
+
+
+def delay_cautions(rig: Rig, silhouettes: Sequence[Silhouettes], first: FirstSeconds, ready: bool) -> list[Caution]:
+    """A sentence on films that are certainly late or early by over a frame, with the remedy; empty if none is."""
+    found = _certain_frames(rig, [silhouettes_of(masks) for masks in first.masks], opening_of(rig).every)
+    if found is None and (rig.count or 0) > SECONDS * rig.rate:
+        every = max(1, round(SECONDS * rig.rate / SETS))
+        found = _certain_frames(rig, _middle(rig, silhouettes, every, ready), every)
+    late = {name: frames for name, frames in zip(rig.names, found or ()) if abs(frames) > LEAST}
+    if not late:
+        return []
+    return [Caution(f"the films do not begin together ({delays_in_words(late)}): `shadowpuppet check --fix` measures that and writes it "
+                    "into [start] of recording.toml", "films do not begin together: `shadowpuppet check --fix`", HARMFUL)]
+
+
+def _certain_frames(rig: Rig, rows: Sequence[Row], every: int) -> list[float] | None:
+    """Frames by which each film is late, 0 if that is not certain; None if the person moves too little to tell any."""
+    offsets = time_offsets(rig.cameras, rows)
+    return None if all(late is None for late in offsets.frames) else [late * every for late in certain_offsets(offsets)]
+
+
+def _middle(rig: Rig, silhouettes: Sequence[Silhouettes], every: int, ready: bool) -> list[Row]:
+    """Silhouettes of the middle of the films."""
+    begin = rig.recording.begin + (rig.count or 0) / rig.rate / 2 - SECONDS / 2
+    recording = replace(rig.recording, begin=begin, duration=begin + SECONDS)
+    part = Rig(recording, tuple(replace(footage, recording=recording) for footage in rig.footage))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when the run comes to it
+        return [silhouettes_of(each.seen.masks) for each in synchronized_frames(part, [one.segmented for one in silhouettes], ready=ready,
+                                                                               every=every, threads=usable_cores())]
