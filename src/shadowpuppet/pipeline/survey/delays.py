@@ -9,35 +9,29 @@ from dataclasses import replace
 from shadowpuppet.calibration.silhouettes import Row, silhouettes_of
 from shadowpuppet.calibration.time_offset import certain_offsets, delays_in_words, time_offsets
 from shadowpuppet.errors import HARMFUL, Caution, ShadowPuppetWarning
-from shadowpuppet.pipeline.look import FirstSeconds
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes
-from shadowpuppet.pipeline.survey.opening import opening_of
 from shadowpuppet.threads import usable_cores
 
-SECONDS, SETS = 3.0, 60
-"""Length (s) of the film's middle that is read where the person stands still at first, and greatest number of sets of it."""
+SECONDS, SETS = 3.0, 45
+"""Length (s) of the films' middle that is read, as at first people often stand still, and greatest number of sets of it."""
 LEAST = 1.0
 """Frames by which a film must be late for the recording to be in doubt."""
 
 
-def delay_cautions(rig: Rig, silhouettes: Sequence[Silhouettes], first: FirstSeconds, ready: bool) -> list[Caution]:
-    """A sentence on films that are certainly late or early by over a frame, with the remedy; empty if none is."""
-    found = _certain_frames(rig, [silhouettes_of(masks) for masks in first.masks], opening_of(rig).every)
-    if found is None and (rig.count or 0) > SECONDS * rig.rate:
-        every = max(1, round(SECONDS * rig.rate / SETS))
-        found = _certain_frames(rig, _middle(rig, silhouettes, every, ready), every)
-    late = {name: frames for name, frames in zip(rig.names, found or ()) if abs(frames) > LEAST}
+def delay_cautions(rig: Rig, silhouettes: Sequence[Silhouettes], ready: bool) -> list[Caution]:
+    """A sentence on films that are certainly late or early by over a frame, with the remedy; empty if none is, or if the films are short or
+    the person moves too little to tell."""
+    if (rig.count or 0) < SECONDS * rig.rate:
+        return []
+    every = max(1, round(SECONDS * rig.rate / SETS))
+    offsets = time_offsets(rig.cameras, _middle(rig, silhouettes, every, ready))
+    found = [late * every for late in certain_offsets(offsets)]
+    late = {name: frames for name, frames in zip(rig.names, found) if abs(frames) > LEAST}
     if not late:
         return []
     return [Caution(f"the films do not begin together ({delays_in_words(late)}): `shadowpuppet check --fix` measures that and writes it "
                     "into [start] of recording.toml", "films do not begin together: `shadowpuppet check --fix`", HARMFUL)]
-
-
-def _certain_frames(rig: Rig, rows: Sequence[Row], every: int) -> list[float] | None:
-    """Frames by which each film is late, 0 if that is not certain; None if the person moves too little to tell any."""
-    offsets = time_offsets(rig.cameras, rows)
-    return None if all(late is None for late in offsets.frames) else [late * every for late in certain_offsets(offsets)]
 
 
 def _middle(rig: Rig, silhouettes: Sequence[Silhouettes], every: int, ready: bool) -> list[Row]:

@@ -79,8 +79,7 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     doubts += [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
     if not (refusal or several or agree.doubts()):
-        steps("do the films begin together")
-        doubts += delay_cautions(rig, silhouettes, first, options.masks)
+        doubts += delay_cautions(rig, silhouettes, options.masks)
     if several:
         doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
                                  f"{several} people: each is tracked", NOTED))
