@@ -52,7 +52,7 @@ class MaskKind:
 def mask_kind(source: Path, label: int | None = None) -> MaskKind:
     """The kind of the masks in a film, picture or folder of pictures; `label`: the person's, where masks are labels.
 
-    Raises `SilhouetteError` for several labels of which none is chosen, and for a label of masks that are a film; `VideoError`.
+    Raises `SilhouetteError` for several labels without a choice, for a label that no mask has, and for a label of a film; `VideoError`.
     """
     if not are_pictures(source):
         if label is not None:
