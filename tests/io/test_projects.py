@@ -89,6 +89,12 @@ def test_of_two_people_s_heights_none_is_taken(pose2sim):
     assert read_recording(pose2sim).subject.height is None
 
 
+@pytest.mark.parametrize(("text", "several"), [("", False), ("multi_person = false\n", False), ("multi_person = true\n", True)])
+def test_a_project_may_state_several_people(pose2sim, text, several):
+    (pose2sim.parent / "Config.toml").write_text(f"[project]\n{text}")
+    assert read_recording(pose2sim).several == several
+
+
 @pytest.mark.parametrize(("text", "said"), [
     ("participant_height = 172", "project.participant_height: found 172, expected 0.5 to 2.5 metres"),
     ("frame_range = [10]", r"project.frame_range: found \[10\], expected 'auto', 'all', or the first and last frame"),

@@ -49,6 +49,8 @@ class Project:
     """Frames/s, where the project replaces the films' own."""
     frames: tuple[int, int] | None = None
     """First and last frame used."""
+    several: bool = False
+    """Whether it states several people."""
     no_calibration: str = ""
     """Why there is no calibration, and what to do."""
 
@@ -94,7 +96,7 @@ def _pose2sim(folder: Path) -> Project | None:
     known = _Config(folder / "Config.toml", [config.get("project", {}) for config in configs])
     return Project("Pose2Sim", folder, folder.resolve().name, films, calibration, ("trc", folder / "pose-3d"), known.height(),
                    known.rate(), known.frames(),
-                   "Pose2Sim's calibration, a file in calibration/ beside or above the trial, is missing")
+                   known.several(), "Pose2Sim's calibration, a file in calibration/ beside or above the trial, is missing")
 
 
 def _levels(folder: Path) -> Iterator[Path]:
@@ -122,6 +124,10 @@ class _Config:
 
     def _value(self, key: str) -> Any:
         return next((table[key] for table in self.tables if key in table), "auto")
+
+    def several(self) -> bool:
+        """`multi_person`."""
+        return self._value("multi_person") is True
 
     def rate(self) -> float | None:
         """`frame_rate`, unless it is a word or zero."""

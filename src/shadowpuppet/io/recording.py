@@ -92,6 +92,8 @@ class Recording:
     """First moment used, seconds after time 0; the frames before are passed over, and times stay those after time 0."""
     truths: tuple[Path, ...] = ()
     """With several people: truth_1.csv, truth_2.csv, ..., one for each."""
+    several: bool = False
+    """Whether the project of another program states several people."""
     whole: Recording | None = None
     """The whole recording, where this is a part of it (`--start`, `--end`); None otherwise."""
 
@@ -236,7 +238,8 @@ def _with_facts(recording: Recording, project: Project) -> Recording:
         of_film = rate or open_frames(recording.views[0].video).rate
         begin, duration = max(first - 0.5, 0) / of_film, (last + 0.5) / of_film
     subject = replace(recording.subject, height=recording.subject.height or project.height)
-    return replace(recording, name=project.name, subject=subject, rate=rate, begin=begin, duration=duration)
+    return replace(recording, name=project.name, subject=subject, rate=rate, begin=begin, duration=duration,
+                   several=project.several)
 
 
 def _truths(folder: Path) -> tuple[Path, ...]:
