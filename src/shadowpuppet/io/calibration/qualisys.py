@@ -21,7 +21,8 @@ from shadowpuppet.io.calibration.roles import of_films
 SUBPIXELS = 64
 BACKWARD = np.diag([1.0, -1.0, -1.0])
 """From axes with y up and z backward to OpenCV's."""
-CAMERA_KEYS = ("active", "avg-residual", "calibrated", "id", "model", "name", "points-count", "serial", "video_resolution", "viewrotation")
+CAMERA_KEYS = ("active", "avg-residual", "calibrated", "id", "message", "model", "name", "point-count", "points-count", "serial",
+               "video_resolution", "viewrotation")
 """Attributes of a camera. `active`, `model` and `serial` are used; `viewrotation` is named where it is not zero."""
 PARTS = {"fov_video": ("left", "top", "right", "bottom"),
          "transform": ("x", "y", "z", *(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))),
