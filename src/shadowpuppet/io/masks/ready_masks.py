@@ -158,7 +158,7 @@ def _values(pictures: Iterable[NDArray[np.uint16]]) -> list[int]:
 
 
 def _surrounds(masks: list[Mask]) -> bool:
-    """Whether what masks (H, W) hold is the background: it fills the border, and not the whole picture."""
+    """Whether masks (H, W) show the background: they fill the border, and not the whole picture."""
     borders = [np.concatenate([mask[0], mask[-1], mask[1:-1, 0], mask[1:-1, -1]]).mean() for mask in masks]
     return bool(borders) and float(np.median(borders)) >= AROUND and min(float(mask.mean()) for mask in masks) < 1 - SOME
 
