@@ -20,6 +20,7 @@ from shadowpuppet.errors import ShadowPuppetWarning, printable
 from shadowpuppet.live.display.view import LiveListener
 from shadowpuppet.pipeline.findings.look import Look, RigLook
 from shadowpuppet.pipeline.findings.verdict import verdict_of_look
+from shadowpuppet.video.film import NOT_LATER
 
 LOG_EVERY = 2.0
 """Seconds between lines of progress where there is no terminal."""
@@ -146,10 +147,11 @@ class Terminal(LiveListener):
             self.warn(doubt)
 
     def warn(self, message: str) -> None:
-        """Print a warning on one line, once."""
+        """Print a warning on one line, once; frames that are not later than those before, once for all films."""
         line = printable(f"warning: {' '.join(message.split())}")
-        if line not in self._said:
-            self._said.add(line)
+        said = NOT_LATER if NOT_LATER in line else line
+        if said not in self._said:
+            self._said.add(said)
             self.console.print(line, soft_wrap=True)
 
     def note(self, message: str) -> None:

@@ -8,7 +8,7 @@
     motion.npz     the fields of `Motion`, arrays only
     raw.csv        joints.csv and angles.csv as they were tracked, if they were smoothed afterwards; then run.toml has [smoothing]
     run.toml       complete, frames, body, versions, and what the tracker adds: recording, method, seed, settings, sizes, ...; [floor] with
-                   its height in the world (m) where that is not 0, as before a camera of which only the field of view is known
+                   its height in the world (m) where that is not 0, as before a camera that is known by its field of view alone
     metrics.json   complete, frames, status (number of frames of each), limb_status (likewise, by limb), timings, errors, ...
 
 The tables grow with every frame; the other files are written at the end, also after an error. `complete` in run.toml says whether all

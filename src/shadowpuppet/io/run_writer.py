@@ -19,7 +19,7 @@ from shadowpuppet.io.files.plain import for_toml, json_text, plain
 from shadowpuppet.io.files.table import csv_line
 from shadowpuppet.io.files.text import read_toml, write_whole
 from shadowpuppet.io.inputs.earlier_run import check_folder, unmark
-from shadowpuppet.io.inputs.inputs import Resuming
+from shadowpuppet.io.inputs.inputs import NO_INPUTS, Inputs, Resuming
 from shadowpuppet.io.inputs.same_run import INPUTS, check_same, write_inputs
 from shadowpuppet.io.intervals import IntervalWriter
 from shadowpuppet.io.motion.npz import write_motion_npz
@@ -51,9 +51,9 @@ class RunWriter:
     """
 
     def __init__(self, folder: str | Path, body_name: str, dof_names: Sequence[str], joint_names: Sequence[str],
-                 info: Mapping[str, Any], resume: Resuming | None = None, of_group: bool = False) -> None:
+                 info: Mapping[str, Any], resume: Resuming | Inputs = NO_INPUTS, of_group: bool = False) -> None:
         """`info`: entries of run.toml; dataclasses, arrays and paths are converted, values of None are left out. `resume`: whether an
-        earlier run of the same `info` and inputs goes on from its checkpoint; None: no checkpoints are kept. `of_group`: whether it
+        earlier run of the same `info` and inputs goes on from its checkpoint; inputs alone: no checkpoints are kept. `of_group`: whether it
         is the run of one of several people, with one checkpoint for all."""
         taken = set(info) & set(OWN_KEYS)
         if taken:
@@ -65,7 +65,8 @@ class RunWriter:
         self._modes = dict[float, Sequence[Mode]]()
         """Other places of limbs, by time: a motion does not keep them."""
         self._tables: Sequence[BinaryIO] = ()
-        self._resume, self._earlier, self._stack = resume, False, contextlib.ExitStack()
+        self._resume, self._inputs = (None, resume) if isinstance(resume, Inputs) else (resume, resume.inputs)
+        self._earlier, self._stack = False, contextlib.ExitStack()
         self._lock: Lock
         self._before: list[MotionFrame] | None = None
         self._people, self._of_group = False, of_group
@@ -113,7 +114,7 @@ class RunWriter:
         """Raise `ShadowPuppetError` if the folder is not this run's any more, or if one of its inputs differs from what it was when the run
         began: in size or time of change."""
         self._lock.check()
-        if changed := "" if self._resume is None else self._resume.inputs.changed():
+        if changed := self._inputs.changed():
             raise ShadowPuppetError(f"{self.folder}: {changed} while the run went on: it is not complete, as its frames would be of two "
                                     "recordings; track it again with --force")
 
@@ -310,7 +311,7 @@ class RunWriter:
     def _keep_inputs(self) -> None:
         """Keep what the run's inputs hold, for a run that goes on."""
         if self._resume is not None and not self._of_group:
-            write_inputs(self.folder, self._resume.inputs)
+            write_inputs(self.folder, self._inputs)
 
     def _check_same(self, resume: Resuming, earlier: Mapping[str, Any]) -> None:
         """Raise `CompleteRun` if an earlier run is complete, `ShadowPuppetError` if it is another one than this."""

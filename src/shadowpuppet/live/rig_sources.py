@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -49,6 +50,12 @@ def is_rig(source: str) -> bool:
     """Whether a source stands for several cameras: names separated by commas, or the folder of a recording."""
     path = Path(source)
     return (path / "video").is_dir() if path.exists() else len(_parts(source)) > 1
+
+
+def sources_of(source: str) -> tuple[Path, ...]:
+    """The films and folders that a source names, or the recording; none for cameras and streams."""
+    path = Path(source)
+    return (path,) if os.path.exists(path) else tuple(Path(part) for part in _parts(source) if os.path.exists(part))
 
 
 def open_rig_sources(options: Options, settings: LiveSettings) -> RigSources:

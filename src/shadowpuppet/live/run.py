@@ -14,9 +14,10 @@ import numpy as np
 
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.io.inputs.inputs import inputs_of
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.io.run_writer import RunWriter, write_metrics
+from shadowpuppet.io.run_writer import RunWriter
 from shadowpuppet.live.base_session import Given, LiveSession, StepResult
 from shadowpuppet.live.display.view import Display, LiveListener
 from shadowpuppet.live.interrupt import Stop
@@ -24,7 +25,7 @@ from shadowpuppet.live.phases import in_background
 from shadowpuppet.live.recorder import Recorder
 from shadowpuppet.live.rig_capture import RigCapture
 from shadowpuppet.live.rig_session import RigSession
-from shadowpuppet.live.rig_sources import is_rig, open_rig_sources
+from shadowpuppet.live.rig_sources import is_rig, open_rig_sources, sources_of
 from shadowpuppet.live.session import CameraSession
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.sources import empty_scene, known_person, lens
@@ -33,7 +34,7 @@ from shadowpuppet.live.timing import Timing
 from shadowpuppet.live.warm_up import warm_up
 from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.metrics import evaluate
-from shadowpuppet.pipeline.options import Options, plain_options
+from shadowpuppet.pipeline.options import PATHS, Options, plain_options
 from shadowpuppet.pipeline.stages.smooth import smooth_run
 from shadowpuppet.pipeline.subject import FittedPerson, average_body, joint_names
 from shadowpuppet.settings import validate
@@ -79,17 +80,17 @@ def run_live(folder: str | Path, options: Options | None = None, settings: LiveS
             "settings": plain_options(options), "live": told}
     folder = Path(folder)
     try:
-        with outlets, RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info) as run:
+        inputs = inputs_of(sources_of(settings.camera), {name: getattr(options, name) for name in PATHS})
+        with outlets, RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, inputs) as run:
             session = _Live(run, options, settings, listener, display, clock, outlets)
             session.run()
             smooth_run(run, session.subjects, options, listener, run.motion, session.session.leans)
+            cameras = session.session.worked_cameras
+            found = evaluate(run.motion, camera=None if several else cameras[0], cameras=len(cameras))
+            run.metrics |= found
     except _Nobody:
         return None
-    motion = read_run(folder).motion
-    cameras = session.session.worked_cameras
-    metrics = read_run(folder).metrics | evaluate(motion, camera=None if several else cameras[0], cameras=len(cameras))
-    write_metrics(folder, metrics)
-    return metrics
+    return read_run(folder).metrics | found
 
 
 class _Live:

@@ -192,6 +192,8 @@ def check_used(options: Options, several: bool) -> None:
     idle = [name for key in (OF_ONE if several else OF_SEVERAL) for name in _changed(key, usual[key], now[key])]
     if idle:
         warn(f"no effect with {cameras}: {', '.join(idle)}")
+    if options.label is not None and not options.masks:
+        warn("no effect without ready silhouettes (--masks): label")
 
 
 def _changed(name: str, usual: Any, now: Any) -> Iterator[str]:

@@ -38,8 +38,8 @@ FRAME_BYTES = 3
 
 @contextlib.contextmanager
 def opened(path: Path, threads: int | None = None) -> Iterator[tuple[InputContainer, VideoStream]]:
-    """Open a film; gives its container and video stream. `threads` that decode: each of several has a frame of its own before the first
-    comes, so that one is quicker for a few frames. Raises `VideoError`."""
+    """Open a film; gives its container and video stream. `threads`: number of threads that decode; one is quicker for a few frames, as each
+    of several decodes a frame before the first comes. Raises `VideoError`."""
     import av
     import av.error
 
@@ -88,7 +88,7 @@ def _stated_size(path: Path) -> tuple[int, int]:
 
 
 def _threads(pixels: int) -> int:
-    """Number of threads that decode frames of so many pixels, each of which holds one; 0: FFmpeg's default."""
+    """Number of threads that decode frames of `pixels`; each thread holds one frame. 0: FFmpeg's default."""
     most, limit = FILE_MEMORY // (FRAME_BYTES * max(pixels, 1)), thread_limit() or 0
     return limit if most >= (limit or os.cpu_count() or 1) else max(most, 1)
 

@@ -30,6 +30,8 @@ FULL_RANGE = 2
 """FFmpeg's AVCOL_RANGE_JPEG: luma over 0..255."""
 EVEN = 0.25
 """Greatest difference of a steady film's times from even ones, over their interval: a missing frame makes half."""
+NOT_LATER = "one that is not later"
+"""In a message about such frames, of which a terminal shows one for all films of a recording."""
 LONGEST_STUTTER = 1.0
 """Seconds; times that go back by more are taken for a restart of the clock."""
 STUDIO_TO_FULL = np.clip(np.round((np.arange(256) - 16) * (255 / 219)), 0, 255).astype(np.uint8)
@@ -239,7 +241,7 @@ class _Clock:
         if time > self.last:
             return time
         self.bad_pts += 1
-        self._warn(self.last, "is followed by one that is not later; times are moved so that they increase")
+        self._warn(self.last, f"is followed by {NOT_LATER}; times are moved so that they increase")
         if self.last - time < LONGEST_STUTTER:  # later times are correct again
             return self.last + self.step / 2
         self.shift += self.last + self.step - time  # the clock restarted
