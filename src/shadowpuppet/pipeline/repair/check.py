@@ -22,6 +22,7 @@ from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, uncluttered_silhouettes
 from shadowpuppet.pipeline.survey.film import brief_length
+from shadowpuppet.pipeline.survey.scale import ScaleError
 from shadowpuppet.threads import usable_cores
 
 SETS, MIN_SETS, MAX_SETS_READ = 240, 120, 3000
@@ -77,6 +78,8 @@ class CalibrationCheck:
     """Offsets of the films by their timecode or sound; None if fewer than two have any."""
     by_clock: bool = False
     """Whether the films were put in step by that before silhouettes were compared."""
+    scale: ScaleError | None = None
+    """A wrong scale of the calibration; None if it may be right."""
     doubts: tuple[str, ...] = ()
     """Problems with their remedies, a sentence each."""
 

@@ -23,6 +23,7 @@ from shadowpuppet.pipeline.repair.check import (
 )
 from shadowpuppet.pipeline.repair.clocks import clock_offsets, in_step
 from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.pipeline.survey.scale import error_in
 
 DISAGREE = {"sound": "sound and silhouettes disagree about the films' delays: does the sound of a film lag behind its pictures?",
             "timecode": "timecodes and silhouettes disagree about the films' delays: were the cameras' clocks set together?"}
@@ -50,9 +51,18 @@ class Checked(NamedTuple):
 
 def check_films(rig: Rig, options: Options, listener: Listener | None = None) -> Checked:
     """As `check_calibration`; also returns the silhouettes compared."""
+    checked = _in_step(rig, options, listener or Listener())
+    if checked.check.agreement.hopeless:
+        return checked
+    scale = error_in(rig, [[None if each is None else each.mask for each in row] for row in checked.sets.rows], options)
+    said = () if scale is None else (str(scale.caution()),)
+    return checked._replace(check=replace(checked.check, scale=scale, doubts=(*said, *checked.check.doubts)))
+
+
+def _in_step(rig: Rig, options: Options, listener: Listener) -> Checked:
+    """The check of agreement and delays."""
     if not rig.is_multiview:
         raise RecordingError(f"{rig.recording.path}: found one camera, expected two or more")
-    listener = listener or Listener()
     sets = gather_silhouettes(rig, options, listener)
     listener.begin("reading the films' clocks")
     clock = clock_offsets(rig)
