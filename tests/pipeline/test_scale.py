@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
-
 import made_rig
 import numpy as np
 import pytest
 import rendered
 
 from shadowpuppet.errors import RUINOUS
-from shadowpuppet.io.calibration.calibration_files import read_calibration, write_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.prepare import look_at
 from shadowpuppet.pipeline.repair.films import check_films
@@ -22,7 +20,7 @@ from shadowpuppet.pipeline.verdict.verdict import verdict_of_look
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
 HEIGHT = 1.75
-"""Of `made_rig.person`, metres."""
+"""Of the person in `lab`, metres."""
 
 
 def error(cameras, masks, factor, height=None):
@@ -82,30 +80,34 @@ def test_who_is_cut_off_at_the_border_tells_no_height():
     assert scale.moments_of(cameras, cut, MultiviewSettings()) == []
 
 
+@pytest.fixture
+def lab(tmp_path):
+    """A recording whose calibration is 1.4 times too large."""
+    cameras, masks = rendered.person(HEIGHT, motion="walk", moments=12)
+    return made_rig.write(tmp_path / "lab", [made_rig.scaled(camera, 1.4) for camera in cameras], masks)
+
+
 @pytest.mark.whole
-def test_info_and_check_name_a_wrong_scale_and_fix_mends_it(rig_recording, tmp_path):
-    lab = shutil.copytree(rig_recording, tmp_path / "lab")
-    write_calibration(lab / "calibration.toml", [made_rig.scaled(camera, 1.4) for camera in made_rig.cameras()])
+def test_info_and_check_name_a_wrong_scale_and_fix_mends_it(lab):
     options = Options(masks=True, height=HEIGHT)
     look = look_at(lab, options)
     assert verdict_of_look(look).word == "bad"
     assert "the board's square?" in verdict_of_look(look).reasons[0]
     rig = open_rig(lab, options)
     checked = check_films(rig, options)
+    assert checked.check.scale is not None
     assert checked.check.scale.factor == pytest.approx(1.4, rel=0.05)
     assert "the board's square?" in checked.check.doubts[0]
     fix = fix_recording(rig, checked)
     assert any("all lengths divided by 1.4" in line for line in fix.done)
-    for now, true in zip(read_calibration(lab / "calibration.toml"), made_rig.cameras()):
-        assert now.centre == pytest.approx(true.centre, rel=0.05)
+    for now, true in zip(read_calibration(lab / "calibration.toml"), rendered.person(HEIGHT, motion="walk", moments=12)[0]):
+        assert now.centre == pytest.approx(true.centre, rel=0.05, abs=0.01)
     assert (lab / "calibration.before1.toml").exists()
     assert check_films(open_rig(lab, options), options).check.scale is None
 
 
 @pytest.mark.whole
-def test_without_the_height_nothing_is_mended(rig_recording, tmp_path):
-    lab = shutil.copytree(rig_recording, tmp_path / "lab")
-    write_calibration(lab / "calibration.toml", [made_rig.scaled(camera, 1.4) for camera in made_rig.cameras()])
+def test_without_the_height_nothing_is_mended(lab):
     rig, options = open_rig(lab, Options(masks=True)), Options(masks=True)
     checked = check_films(rig, options)
     assert checked.check.scale is not None

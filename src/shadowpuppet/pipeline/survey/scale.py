@@ -18,9 +18,8 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.height_estimation import DEVIATION
-from shadowpuppet.tracking.multiview.seen_stature import extents, seen_stature
+from shadowpuppet.tracking.multiview.seen_stature import hull_extents, seen_stature
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
-from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 
 PEOPLE = (0.9, 2.2)
 """Heights of people, metres, from children on."""
@@ -28,8 +27,8 @@ WRONG = 1.15
 """Ratio of scales that counts as wrong if the height is known; it is named from half of that way on, the square root."""
 FRAMES = 4
 """Number of moments in which the height is looked for."""
-SLENDER = 2.0
-"""Least ratio of the two longest extents of a person who stands."""
+SLENDER = 3.0
+"""Least ratio of the longest extent of a person who stands to the geometric mean of the others: who sits has about 2.6."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +98,7 @@ def moments_of(cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]]
 def stands(extents: Sequence[Array], height: float | None) -> bool:
     """Whether hulls of these extents (3,), metres, are mostly a standing person's, who is as tall as people are, or as is known."""
     low, high = _limits(height)
-    standing = [longest for longest, second, _ in extents if longest > SLENDER * second]
+    standing = [longest for longest, second, third in extents if longest > SLENDER * (second * third) ** 0.5]
     return 2 * len(standing) > len(extents) and bool(low < np.median(standing) < high)
 
 
@@ -130,7 +129,7 @@ def _limits(height: float | None) -> tuple[float, float]:
 def _moment(cameras: Sequence[Camera], masks: Sequence[Mask | None], settings: MultiviewSettings) -> list[Moment]:
     """A moment, if at least two cameras see a whole person: what reaches the picture's border may be cut off."""
     whole = tuple(None if mask is None or not may_be_person(mask) else _whole(mask) for mask in masks)
-    found = extents(VisualHull(cameras, settings.hull).points(whole).points) if sum(mask is not None for mask in whole) > 1 else np.zeros(3)
+    found = hull_extents(cameras, whole, settings.hull) if sum(mask is not None for mask in whole) > 1 else np.zeros(3)
     return [Moment(whole, found)] if found[0] else []
 
 

@@ -20,7 +20,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
 from shadowpuppet.tracking.multiview.height_estimation import LEAST_POINTS, STRAY
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
-from shadowpuppet.tracking.multiview.settings import MultiviewSettings
+from shadowpuppet.tracking.multiview.settings import HullSettings, MultiviewSettings
 from shadowpuppet.tracking.multiview.size_estimation import (
     CLOTHES,
     EMPTINESS_SHARE,
@@ -29,14 +29,16 @@ from shadowpuppet.tracking.multiview.size_estimation import (
     SIZE_PULL,
     widened,
 )
-from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
+from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 from shadowpuppet.tracking.status import status_of
 
 EXTENT = 1.6
 """Longest extent, metres, to which a hull is brought first: between a sitting person's and that of one who reaches up."""
-TURNS = 2
+TURNS = 3
 """Number of fits, each in a world in which the person is of average height by the one before: costs and priors are made for that size."""
+ANY = 1e3
+"""A length, metres, that no hull has."""
 LOOSE = 0.5
 """Standard deviation of the relative stature: hardly any."""
 
@@ -68,6 +70,29 @@ def extents(points: Array) -> Array:
     return np.sort(along[-1 - STRAY] - along[STRAY])[::-1]
 
 
+def hull_extents(cameras: Sequence[Camera], masks: Sequence[Mask | None], settings: HullSettings) -> Array:
+    """Extents (3,), metres, of the hull of masks (H, W), as `extents`. The settings' lengths are for a person: all of the hull tells the
+    size first."""
+    found, factor = np.zeros(3), 1.0
+    for hull in (replace(settings, longest=ANY), settings):
+        found = extents(person_points([scaled(camera, factor) for camera in cameras], masks, hull).points) / factor
+        if not found[0]:
+            break
+        factor = EXTENT / float(found[0])
+    return found
+
+
+def person_points(cameras: Sequence[Camera], masks: Sequence[Mask | None], settings: HullSettings) -> SurfacePoints:
+    """Surface points of masks (H, W) that all show the whole of one person: a point beside one of the pictures is none of the person's."""
+    found = VisualHull(cameras, settings).points(masks)
+    inside = np.ones(len(found.points), bool)
+    for camera, mask in zip(cameras, masks):
+        if mask is not None:
+            pixels = camera.project(found.points)
+            inside &= (pixels >= 0).all(1) & (pixels <= np.array(camera.size) - 1).all(1)  # NaN is not inside
+    return found.picked(inside)
+
+
 def scaled(camera: Camera, factor: float) -> Camera:
     """The camera in a world whose lengths are multiplied."""
     T = camera.T_camera_world.copy()
@@ -77,9 +102,9 @@ def scaled(camera: Camera, factor: float) -> Camera:
 
 def seen_stature(rng: np.random.Generator, cameras: Sequence[Camera], masks: Sequence[Mask | None],
                  settings: MultiviewSettings) -> SeenStature | None:
-    """The height that masks (H, W) of one moment, by camera, ask for; None if no body fits them. With the cameras' world the height grows
+    """The height that masks (H, W) of one moment, by camera, that show the whole person ask for; None if no body fits them. With the cameras' world the height grows
     in proportion: nothing else depends on its scale."""
-    longest = extents(VisualHull(cameras, settings.hull).points(masks).points)[0]
+    longest = hull_extents(cameras, masks, settings.hull)[0]
     if not longest:
         return None
     plain, make = replace(settings, method="hybrid", refinement="gauss_newton"), _maker(settings.body)
@@ -87,7 +112,7 @@ def seen_stature(rng: np.random.Generator, cameras: Sequence[Camera], masks: Seq
     height = overlap = 0.0
     for _ in range(TURNS):
         world = tuple(scaled(camera, factor) for camera in cameras)
-        points, tracker = VisualHull(world, settings.hull).points(masks), MultiviewTracker(make(usual), world, plain)
+        points, tracker = person_points(world, masks, settings.hull), MultiviewTracker(make(usual), world, plain)
         if pose is None:
             state = tracker.start(rng, points, masks)
             if state.status == "absent":
