@@ -24,6 +24,7 @@ from shadowpuppet.pipeline.repair.check import (
 from shadowpuppet.pipeline.repair.clocks import clock_offsets, in_step
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.survey.scale import error_in
+from shadowpuppet.pipeline.survey.upright import up_caution
 
 DISAGREE = {"sound": "sound and silhouettes disagree about the films' delays: does the sound of a film lag behind its pictures?",
             "timecode": "timecodes and silhouettes disagree about the films' delays: were the cameras' clocks set together?"}
@@ -54,8 +55,9 @@ def check_films(rig: Rig, options: Options, listener: Listener | None = None) ->
     checked = _in_step(rig, options, listener or Listener())
     if checked.check.agreement.hopeless:
         return checked
-    scale = error_in(rig, [[None if each is None else each.mask for each in row] for row in checked.sets.rows], options)
-    said = () if scale is None else (str(scale.caution()),)
+    masks = [[None if each is None else each.mask for each in row] for row in checked.sets.rows]
+    scale, not_up = error_in(rig, masks, options), up_caution(rig.cameras, masks, options.multiview)
+    said = [str(each) for each in (None if scale is None else scale.caution(), not_up) if each is not None]
     return checked._replace(check=replace(checked.check, scale=scale, doubts=(*said, *checked.check.doubts)))
 
 

@@ -30,6 +30,7 @@ from shadowpuppet.pipeline.survey.cautions import (
 from shadowpuppet.pipeline.survey.film import FilmSurvey, brief_length, of_several, survey_film
 from shadowpuppet.pipeline.survey.opening import OPENING, first_seconds, opening_of
 from shadowpuppet.pipeline.survey.scale import error_in
+from shadowpuppet.pipeline.survey.upright import up_caution
 from shadowpuppet.silhouette.added import SceneHint
 from shadowpuppet.threads import one_opencv_thread, usable_cores
 from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
@@ -77,13 +78,14 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     refusal = _rig_refusal(look, first)
     steps("is the scale right")
     scale = None if refusal else error_in(rig, first.masks, options)
+    not_up = None if refusal else up_caution(rig.cameras, first.masks, options.multiview)
     recovered = frozenset(camera.name for camera, each in zip(look.cameras, silhouettes, strict=True) if each.recovered is not None)
     doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     doubts += [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
     if several:
         doubts.insert(0, Caution(f"{several} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
                                  f"{several} people: each is tracked", NOTED))
-    doubts = [*([scale.caution()] if scale is not None else []), *doubts]
+    doubts = [each for each in (None if scale is None else scale.caution(), not_up) if each is not None] + doubts
     look = replace(look, refusal=refusal, doubts=() if refusal else tuple(doubts))
     return Survey(rig, silhouettes, silhouettes, first, look, census)
 

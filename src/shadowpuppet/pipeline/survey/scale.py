@@ -98,8 +98,14 @@ def moments_of(cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]]
 def stands(extents: Sequence[Array], height: float | None) -> bool:
     """Whether hulls of these extents (3,), metres, are mostly a standing person's, who is as tall as people are, or as is known."""
     low, high = _limits(height)
-    standing = [longest for longest, second, third in extents if longest > SLENDER * (second * third) ** 0.5]
+    standing = [each[0] for each in extents if is_slender(each)]
     return 2 * len(standing) > len(extents) and bool(low < np.median(standing) < high)
+
+
+def is_slender(extents: Array) -> bool:
+    """Whether extents (3,) are those of a person who stands or lies, arms at the sides or raised."""
+    longest, second, third = extents
+    return bool(longest > SLENDER * (second * third) ** 0.5)
 
 
 def fitted_heights(cameras: Sequence[Camera], moments: Sequence[Moment], settings: MultiviewSettings) -> Array:
