@@ -19,18 +19,23 @@ import smallest
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.pipeline.survey.scale import fitted_heights, judged, moments_of, stands
-from shadowpuppet.synthetic import Gesture, Mannequin, Ring, Scene, Spec
+from shadowpuppet.synthetic import Mannequin, Ring, Scene, Spec
+from shadowpuppet.synthetic.movement.resting import PostureName
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.dressed import dressed
+from shadowpuppet.synthetic.person.mannequin import Kind
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
+from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
 FACTORS = (0.7, 0.87, 1.0, 1.15, 1.4, 2.0)
-PEOPLE = (("child", 1.2), ("man", 2.05), ("woman", None), ("man", None), ("child", None))
+PEOPLE: tuple[tuple[Kind, float | None], ...] = (
+    ("child", 1.2), ("man", 2.05), ("woman", None), ("man", None), ("child", None))  # fmt: skip
 """Kind and stature, metres; None: drawn."""
-MOTIONS = (("walk", "standing"), ("stand", "standing"), ("reach", "standing"), ("reach", "seated"), ("stand", "seated"))
+MOTIONS: tuple[tuple[str, PostureName], ...] = (
+    ("walk", "standing"), ("stand", "standing"), ("reach", "standing"), ("reach", "seated"), ("stand", "seated"))  # fmt: skip
 """Gesture and posture."""
 LIGHTS = np.array([[0, 0, 1.0, 0]] * 3)
 """Silhouettes need none."""
@@ -44,7 +49,7 @@ def rings() -> Iterator[tuple[str, Spec]]:
                     start_deg=float(rng.uniform(-180, 180)), seed=n)
         body = Mannequin.draw(rng, kind, stature=stature)
         yield (f"{kind} of {body.stature:.2f} m, {posture if posture == 'seated' else gesture}, {ring.count} cameras",
-               Spec(body=body, motion=(Gesture(motion=gesture, seconds=3),), posture=posture, rate=10, ring=ring,
+               Spec(body=body, motion=parse_gestures(f"{gesture} 3"), posture=posture, rate=10, ring=ring,
                     scene=Scene(clothing=n), seed=n))
 
 

@@ -38,6 +38,8 @@ def test_a_scale_is_wrong_beyond_the_heights_of_people_or_the_known_one_and_its_
 
 def test_the_factor_has_the_doubt_of_moments_and_of_an_unknown_height():
     known, unknown = judged(np.array([2.4, 2.5, 2.6]), 1.75), judged(np.array([2.4, 2.5, 2.6]), None)
+    assert known is not None
+    assert unknown is not None
     assert known.factor == pytest.approx(2.5 / 1.75)
     assert known.doubt == pytest.approx(0.04, abs=0.001)
     assert unknown.doubt > known.doubt
@@ -63,7 +65,8 @@ def test_a_standing_person_of_the_right_size_needs_no_fit(monkeypatch):
 @pytest.mark.parametrize(("factor", "height", "named"), [(1.4, None, True), (1.0, None, False), (1.15, 1.75, True), (0.87, 1.75, True),
                                                          (1.0, 1.75, False)])  # fmt: skip
 def test_a_seated_person_tells_a_wrong_scale_and_no_right_one(factor, height, named):
-    found = error(*rendered.person(1.75, "seated", motion="reach", moments=2), factor, height)
+    cameras, masks = rendered.person(1.75, "seated", motion="reach", moments=2)
+    found = error(cameras, masks, factor, height)
     assert (found is not None) is named
     if height and found is not None:
         assert found.factor == pytest.approx(factor, rel=0.05)
@@ -72,7 +75,9 @@ def test_a_seated_person_tells_a_wrong_scale_and_no_right_one(factor, height, na
 def test_who_is_cut_off_at_the_border_tells_no_height():
     mask = np.zeros((20, 30), bool)
     mask[5:15, 4:9] = mask[0:2, 25:] = True  # the smaller part reaches the border
-    assert np.count_nonzero(_whole(mask)) == 50
+    whole = _whole(mask)
+    assert whole is not None
+    assert np.count_nonzero(whole) == 50
     mask[15:, 4:9] = True
     assert _whole(mask) is None
     cameras, masks = rendered.person(1.75)

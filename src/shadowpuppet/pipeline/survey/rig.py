@@ -76,7 +76,6 @@ def survey_rig(rig: Rig, options: Options, hints: Sequence[SceneHint] = (), list
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agree)
     refusal = _rig_refusal(look, first)
-    steps("is the scale right")
     scale = None if refusal else error_in(rig, first.masks, options)
     not_up = None if refusal else up_caution(rig.cameras, first.masks, options.multiview)
     recovered = frozenset(camera.name for camera, each in zip(look.cameras, silhouettes, strict=True) if each.recovered is not None)

@@ -42,7 +42,8 @@ def up_caution(cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]]
     if (np.abs(axes[:, 2]) < 0.5**0.5).all():
         along = "xyz"[int(np.abs(axes).mean(0).argmax())]
         return _caution("lies in all frames of a walk", f"{along} or -{along}")
-    if (axes[:, 2] ** 2 > 0.5).all() and all(map(_is_top_heavy, points)) and _fits_turned_over(cameras, moments[len(moments) // 2], settings):
+    on_head = (axes[:, 2] ** 2 > 0.5).all() and all(map(_is_top_heavy, points))
+    if on_head and _fits_turned_over(cameras, moments[len(moments) // 2], settings):
         return _caution("stands on the head in all frames of a walk", "-z")
     return None
 
@@ -62,5 +63,5 @@ def _fits_turned_over(cameras: Sequence[Camera], moment: Moment, settings: Multi
 
 
 def _caution(what: str, up: str) -> Caution:
-    return Caution(f"the person {what}: the calibration's Z is not up, it seems; say up = \"{up}\" in recording.toml, or write the calibration "
-                   "upright: `shadowpuppet info calibration.toml --up ... --to up.toml`", f"Z is not up, it seems: up = \"{up}\"", RUINOUS)
+    return Caution(f"the person {what}: the calibration's Z is not up, it seems; say up = \"{up}\" in recording.toml, or write the "
+                   "calibration upright: `shadowpuppet info calibration.toml --up ... --to up.toml`", f"Z is not up, it seems: up = \"{up}\"", RUINOUS)

@@ -102,8 +102,8 @@ def scaled(camera: Camera, factor: float) -> Camera:
 
 def seen_stature(rng: np.random.Generator, cameras: Sequence[Camera], masks: Sequence[Mask | None],
                  settings: MultiviewSettings) -> SeenStature | None:
-    """The height that masks (H, W) of one moment, by camera, that show the whole person ask for; None if no body fits them. With the cameras' world the height grows
-    in proportion: nothing else depends on its scale."""
+    """The height that masks (H, W) of one moment, by camera, that show the whole person ask for; None if no body fits them. It grows with
+    the cameras' world in proportion: nothing else depends on the world's scale."""
     longest = hull_extents(cameras, masks, settings.hull)[0]
     if not longest:
         return None
