@@ -33,8 +33,8 @@ class Fix:
 
 def fix_recording(rig: Rig, checked: Checked) -> Fix:
     """Write certain delays into [start] of recording.toml, and certain rotations, and the scale of a person of known height, into a new
-    calibration.toml. Changes nothing that leaves the cameras more apart than before. Raises `RecordingError` if the recording is no folder or
-    a file cannot be written."""
+    calibration.toml. Changes nothing that leaves the cameras more apart than before. Raises `RecordingError` if the recording is no folder
+    or a file cannot be written."""
     folder, found = rig.recording.path, checked.check
     factor = found.scale.factor if found.scale is not None and found.scale.is_known else 1.0
     if factor == 1 and (found.agreement.remedy is not None or not (found.starts or found.turns)):

@@ -64,4 +64,5 @@ def _fits_turned_over(cameras: Sequence[Camera], moment: Moment, settings: Multi
 
 def _caution(what: str, up: str) -> Caution:
     return Caution(f"the person {what}: the calibration's Z is not up, it seems; say up = \"{up}\" in recording.toml, or write the "
-                   "calibration upright: `shadowpuppet info calibration.toml --up ... --to up.toml`", f"Z is not up, it seems: up = \"{up}\"", RUINOUS)
+                   "calibration upright: `shadowpuppet info calibration.toml --up ... --to up.toml`",
+                   f"Z is not up, it seems: up = \"{up}\"", RUINOUS)
