@@ -149,3 +149,13 @@ def test_what_cannot_be_explained_is_said(tmp_path, capsys, monkeypatch, tokens,
     assert code == 2
     assert words in err
     assert len(err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("turns", [(2, 2, 2, 2), (0, 2, 1, 0), (1, 0, 3, 0), (1, 1, 1, 1)])
+def test_cameras_rolled_by_quarter_turns_say_nothing_against_z(tmp_path, rig, turns):
+    def rolled(camera, quarters):
+        roll = rotation_from_vector(np.array([0, 0, quarters * np.pi / 2]))
+        return replace(camera, T_camera_world=rigid(roll, np.zeros(3)) @ camera.T_camera_world)
+
+    write_calibration(tmp_path / "c.toml", [rolled(camera, quarters) for camera, quarters in zip(rig, turns)])
+    assert not any("not up" in doubt for doubt in look_at_calibration(tmp_path / "c.toml")[0].doubts)

@@ -17,6 +17,8 @@ PERSON_HEIGHTS = (0.0, 0.9, 1.8)
 """Heights (metres) of a standing person that must lie in the picture for the person to be seen whole."""
 MIN_UP_COSINE = 0.7
 """Least cosine of the pictures' mean up direction to an axis that counts as up."""
+LEVEL_SHARE = 0.9
+"""The world's Z is doubted if it is upright in the pictures, turned by quarters, by less than this share of the direction they agree on."""
 RIG_EXTENT = (0.3, 30.0)
 """Plausible range of the greatest distance between cameras, metres."""
 MAX_CENTRE_OFFSET = 0.2
@@ -113,6 +115,12 @@ def up_direction(cameras: Sequence[Camera]) -> Array:
     return -np.mean([camera.T_camera_world[1, :3] for camera in cameras], 0)
 
 
+def upright(cameras: Sequence[Camera]) -> float:
+    """Mean cosine between the world's Z and the nearest side of each picture: a camera that is rolled by quarter turns says nothing against
+    Z, as pictures are mounted so."""
+    return float(np.mean([np.abs(camera.T_camera_world[:2, 2]).max() for camera in cameras]))
+
+
 def _placement(camera: Camera, middle: Array | None) -> CameraPlacement:
     R, (width, height) = camera.T_camera_world[:3, :3], camera.size
     fov = [float(np.degrees(2 * np.arctan(side / 2 / focal))) for side, focal in zip(camera.size, np.diag(camera.matrix))]
@@ -191,8 +199,8 @@ def _doubts(found: Calibration, middle: Array | None) -> Iterator[str]:
 
 
 def _up_doubts(cameras: Sequence[Camera]) -> Iterator[str]:
-    mean = up_direction(cameras)
-    if mean[2] < MIN_UP_COSINE:
+    mean, of_z = up_direction(cameras), upright(cameras)
+    if of_z < max(MIN_UP_COSINE, LEVEL_SHARE * np.abs(mean).max()):
         named = {name: float(np.dot(axis, mean)) for name, axis in UPS.items() if axis is not None}
         best = max(named, key=lambda name: named[name])
         up = best if named[best] > MIN_UP_COSINE else "cameras"

@@ -27,8 +27,8 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
     Parameters
     ----------
     fix
-        Write what is certain: films' delays into [start] of recording.toml, turned cameras into a new calibration.toml; the old files are
-        kept beside them. Shows the disagreement in pixels before and after.
+        Write what is certain: films' delays into [start] of recording.toml, turned cameras, and a wrong scale if --height is
+        given, into a new calibration.toml; the old files are kept beside them. Shows the disagreement in pixels before and after.
     """
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.repair.films import check_films

@@ -17,6 +17,7 @@ from shadowpuppet.calibration.silhouettes import Row, silhouettes_of
 from shadowpuppet.calibration.time_offset import TimeOffsets, certain_offsets, delays_in_words, time_offsets
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
 from shadowpuppet.pipeline.findings.film import brief_length
+from shadowpuppet.pipeline.findings.scale import ScaleError
 from shadowpuppet.pipeline.footage import Footage, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener, Steps
@@ -76,6 +77,8 @@ class CalibrationCheck:
     """Offsets of the films by their timecode or sound; None if fewer than two have any."""
     by_clock: bool = False
     """Whether the films were put in step by that before silhouettes were compared."""
+    scale: ScaleError | None = None
+    """A wrong scale of the calibration; None if it may be right."""
     doubts: tuple[str, ...] = ()
     """Problems with their remedies, a sentence each."""
 

@@ -10,6 +10,8 @@ import numpy as np
 from shadowpuppet.calibration.clock_offset import ClockOffsets
 from shadowpuppet.calibration.time_offset import MIN_OFFSET, SPREAD_FACTOR, TimeOffsets
 from shadowpuppet.errors import RecordingError
+from shadowpuppet.pipeline.findings.scale import error_in
+from shadowpuppet.pipeline.findings.upright import up_caution
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.repair.check import (
@@ -47,9 +49,19 @@ class Checked(NamedTuple):
 
 def check_films(rig: Rig, options: Options, listener: Listener | None = None) -> Checked:
     """As `check_calibration`; also returns the silhouettes compared."""
+    checked = _in_step(rig, options, listener or Listener())
+    if checked.check.agreement.hopeless:
+        return checked
+    masks = [[None if each is None else each.mask for each in row] for row in checked.sets.rows]
+    scale, not_up = error_in(rig, masks, options), up_caution(rig.cameras, masks, options.multiview)
+    said = [str(each) for each in (None if scale is None else scale.caution(), not_up) if each is not None]
+    return checked._replace(check=replace(checked.check, scale=scale, doubts=(*said, *checked.check.doubts)))
+
+
+def _in_step(rig: Rig, options: Options, listener: Listener) -> Checked:
+    """The check of agreement and delays."""
     if not rig.is_multiview:
         raise RecordingError(f"{rig.recording.path}: found one camera, expected two or more")
-    listener = listener or Listener()
     sets = gather_silhouettes(rig, options, listener)
     listener.begin("reading the films' clocks")
     clock = clock_offsets(rig)

@@ -1,4 +1,4 @@
-"""Writes what `check` found for certain into a recording: delays of films and directions of cameras. Old files are kept."""
+"""Writes what `check` found for certain into a recording: delays of films, directions of cameras, the scale. Old files are kept."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from shadowpuppet.io.files.text import read_toml, write_whole
 from shadowpuppet.pipeline.repair.check import aligned_sets
 from shadowpuppet.pipeline.repair.films import Checked
 from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.tracking.multiview.seen_stature import scaled
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,10 +32,12 @@ class Fix:
 
 
 def fix_recording(rig: Rig, checked: Checked) -> Fix:
-    """Write certain delays into [start] of recording.toml, and certain rotations into a new calibration.toml. Changes nothing that leaves
-    the cameras more apart than before. Raises `RecordingError` if the recording is no folder or a file cannot be written."""
+    """Write certain delays into [start] of recording.toml, and certain rotations, and the scale of a person of known height, into a new
+    calibration.toml. Changes nothing that leaves the cameras more apart than before. Raises `RecordingError` if the recording is no folder
+    or a file cannot be written."""
     folder, found = rig.recording.path, checked.check
-    if found.agreement.remedy is not None or not (found.starts or found.turns):
+    factor = found.scale.factor if found.scale is not None and found.scale.is_known else 1.0
+    if factor == 1 and (found.agreement.remedy is not None or not (found.starts or found.turns)):
         return Fix(done=(), files=(), pixels=())
     if not folder.is_dir():
         raise RecordingError(f"{folder}: expected a folder, as [start] and calibration.toml are written into it")
@@ -49,10 +52,11 @@ def fix_recording(rig: Rig, checked: Checked) -> Fix:
     if found.starts:
         notes["start"] = found.starts
         done.append("recording.toml: [start] " + ", ".join(f"{name} = {value:.4g}" for name, value in found.starts.items()))
-    if found.turns:
+    if found.turns or factor != 1:
         files += replace_calibration(folder / "calibration.toml", [
-            found.turns[view.camera.name].turn.of(view.camera) if view.camera.name in found.turns else view.camera
+            scaled(found.turns[view.camera.name].turn.of(view.camera) if view.camera.name in found.turns else view.camera, 1 / factor)
             for view in rig.recording.views])
+        done += [f"calibration.toml: all lengths divided by {factor:.3f}"] if factor != 1 else []
         done += [f"calibration.toml: {name} turned back by {fix.turn.degrees:.2f} degrees"
                  + (f" and moved back by {100 * fix.turn.distance:.1f} cm" if fix.turn.distance else "")
                  for name, fix in found.turns.items()]

@@ -126,7 +126,12 @@ def shared_deviations(sizes: BoneSizes) -> Array:
 
 def dressed(sizes: Measured) -> Measured:
     """The sizes of a person in clothes: widths and depths larger by `CLOTHES`."""
-    return type(sizes).from_array(sizes.to_array() * np.where(_is_width(type(sizes)), CLOTHES, 1.0))
+    return widened(sizes, CLOTHES)
+
+
+def widened(sizes: Measured, factor: float) -> Measured:
+    """The sizes with widths and depths multiplied by a factor."""
+    return type(sizes).from_array(sizes.to_array() * np.where(_is_width(type(sizes)), factor, 1.0))
 
 
 def _is_width(kind: type[Sizes]) -> NDArray[np.bool_]:

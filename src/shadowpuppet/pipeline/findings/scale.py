@@ -1,0 +1,150 @@
+"""Is the calibration's scale right? The height that silhouettes ask for, against the person's or people's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.calibration.agreement import SETS_COMPARED
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.mask import Mask, may_be_person
+from shadowpuppet.errors import RUINOUS, Finding
+from shadowpuppet.geometry import Array, evenly_spread
+from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.rig import Rig
+from shadowpuppet.threads import one_blas_thread
+from shadowpuppet.tracking.multiview.height_estimation import DEVIATION
+from shadowpuppet.tracking.multiview.seen_stature import hull_extents, seen_stature
+from shadowpuppet.tracking.multiview.settings import MultiviewSettings
+
+PEOPLE = (0.9, 2.2)
+"""Heights of people, metres, from children on."""
+WRONG = 1.15
+"""Ratio of scales that counts as wrong if the height is known; it is named from half of that way on, the square root."""
+FRAMES = 4
+"""Number of moments in which the height is looked for."""
+SLENDER = 3.0
+"""Least ratio of the longest extent of a person who stands to the geometric mean of the others: who sits has about 2.6."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScaleError:
+    """A wrong scale; plain values."""
+
+    height: float
+    """Of the person in the calibration's metres."""
+    expected: float
+    """The person's height, metres; if it is not known, people's mean."""
+    is_known: bool
+    """Whether the person's height is known."""
+    doubt: float
+    """Relative standard deviation of `factor`."""
+
+    @property
+    def factor(self) -> float:
+        """By which the calibration's lengths are too large."""
+        return self.height / self.expected
+
+    def caution(self) -> Finding:
+        """The error and its remedy."""
+        within = f"{self.factor:.2f} ± {self.factor * self.doubt:.2f}"
+        usual = f"the {self.expected:.2f} m that are given" if self.is_known else f"the {self.expected:.2f} m of most people"
+        remedy = ("`shadowpuppet check --fix` divides every translation by that" if self.is_known else
+                  "give the person's --height, and `shadowpuppet check --fix` mends it")
+        return Finding(f"the calibration makes the person {self.height:.2f} m tall: the board's square? All lengths are {within} times too "
+                       f"large by {usual}; measure the square and calibrate again, or {remedy}" if self.factor > 1 else
+                       f"the calibration makes the person {self.height:.2f} m tall: the board's square? All lengths are too small, "
+                       f"{within} times what they should be by {usual}; measure the square and calibrate again, or {remedy}",
+                       f"calibration's scale is wrong, {self.factor:.2f} times: the board's square?", RUINOUS)
+
+
+class Moment(NamedTuple):
+    """What one moment shows of a whole person."""
+
+    masks: tuple[Mask | None, ...]
+    extents: Array
+    """Of the hull, (3,), metres, the longest first."""
+
+
+def error_in(rig: Rig, views: Sequence[Sequence[Mask | None]], options: Options) -> ScaleError | None:
+    """`scale_error` of a rig, of a person whose height the options or the recording may give."""
+    return scale_error(rig.cameras, views, options.multiview, options.height or rig.recording.subject.height)
+
+
+@one_blas_thread()
+def scale_error(cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]], settings: MultiviewSettings,
+                height: float | None = None) -> ScaleError | None:
+    """The scale's error by `views`, masks (H, W) by time and camera, of a person of a known `height`, metres, or any; None if the scale may
+    be right, or nobody is seen well enough.
+
+    Hulls of a person who stands tell at once that a scale is right. A body is fitted where they do not: of people who sit, or reach aside.
+    """
+    moments = moments_of(cameras, views, settings)
+    if stands([moment.extents for moment in moments], height):
+        return None
+    return judged(fitted_heights(cameras, moments, settings), height)
+
+
+def moments_of(cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]], settings: MultiviewSettings) -> list[Moment]:
+    """`FRAMES` moments at most, spread over `views`, in which at least two cameras see a whole person."""
+    whole = [moment for n in evenly_spread(len(views), SETS_COMPARED) if views for moment in _moment(cameras, views[n], settings)]
+    return [whole[n] for n in evenly_spread(len(whole), FRAMES) if whole]
+
+
+def stands(extents: Sequence[Array], height: float | None) -> bool:
+    """Whether hulls of these extents (3,), metres, are mostly a standing person's, who is as tall as people are, or as is known."""
+    low, high = _limits(height)
+    standing = [each[0] for each in extents if is_slender(each)]
+    return 2 * len(standing) > len(extents) and bool(low < np.median(standing) < high)
+
+
+def is_slender(extents: Array) -> bool:
+    """Whether extents (3,) are those of a person who stands or lies, arms at the sides or raised."""
+    longest, second, third = extents
+    return bool(longest > SLENDER * (second * third) ** 0.5)
+
+
+def fitted_heights(cameras: Sequence[Camera], moments: Sequence[Moment], settings: MultiviewSettings) -> Array:
+    """The heights (F,), metres, that bodies have which are fitted to the moments; of moments that a body fits."""
+    fitted = (seen_stature(np.random.default_rng(0), cameras, moment.masks, settings) for moment in moments)
+    return np.array([each.height for each in fitted if each is not None])
+
+
+def judged(heights: Array, height: float | None) -> ScaleError | None:
+    """The scale's error by heights (F,), metres, that moments ask for: their median is beyond the limits by more than their spread."""
+    if len(heights) < 2:
+        return None
+    low, high = np.log(_limits(height))
+    found, spread = float(np.median(np.log(heights))), float(np.log(heights).std(ddof=1))
+    if low - spread < found < high + spread:
+        return None
+    unknown = 0.0 if height is not None else DEVIATION / AVERAGE_HEIGHT
+    return ScaleError(height=float(np.exp(found)), expected=height or AVERAGE_HEIGHT, is_known=height is not None,
+                      doubt=float(np.hypot(spread, unknown)))
+
+
+def _limits(height: float | None) -> tuple[float, float]:
+    """Heights, metres, between which a scale may be right."""
+    return PEOPLE if height is None else (height / WRONG**0.5, height * WRONG**0.5)
+
+
+def _moment(cameras: Sequence[Camera], masks: Sequence[Mask | None], settings: MultiviewSettings) -> list[Moment]:
+    """A moment, if at least two cameras see a whole person: what reaches the picture's border may be cut off."""
+    whole = tuple(None if mask is None or not may_be_person(mask) else _whole(mask) for mask in masks)
+    found = hull_extents(cameras, whole, settings.hull) if sum(mask is not None for mask in whole) > 1 else np.zeros(3)
+    return [Moment(whole, found)] if found[0] else []
+
+
+def _whole(mask: Mask) -> Mask | None:
+    """The largest connected part of a mask (H, W); None if it reaches the border."""
+    import cv2
+
+    _, labels, boxes, _ = cv2.connectedComponentsWithStats(np.ascontiguousarray(mask).view(np.uint8), connectivity=8)
+    largest = 1 + boxes[1:, cv2.CC_STAT_AREA].argmax()
+    x, y, width, height = boxes[largest, :4]
+    inside = x > 0 and y > 0 and x + width < mask.shape[1] and y + height < mask.shape[0]
+    return np.asarray(labels == largest) if inside else None
