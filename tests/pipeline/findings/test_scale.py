@@ -47,7 +47,7 @@ def test_the_factor_has_the_doubt_of_moments_and_of_an_unknown_height():
     assert "1.43 ± 0.06 times too large" in known.caution()
     assert "--height" in unknown.caution()
     assert "check --fix" in known.caution()
-    assert known.caution().weight == RUINOUS
+    assert known.caution().severity == RUINOUS
     assert "too small, 0.57" in ScaleError(height=1.0, expected=1.75, is_known=True, doubt=0.02).caution()
 
 

@@ -53,4 +53,4 @@ def test_who_walks_on_the_head_is_named():
 def test_a_look_says_that_z_is_not_up(tmp_path):
     cameras, masks = rendered.person(1.7, "standing", "walk", 12)
     lab = made_rig.write(tmp_path / "lab", turned(cameras, [np.pi / 2, 0, 0]), masks)
-    assert any("Z is not up" in doubt.short for doubt in look_at(lab, Options(masks=True)).doubts)
+    assert any("Z is not up" in doubt.short for doubt in look_at(lab, Options(masks=True)).findings)
