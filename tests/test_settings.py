@@ -84,7 +84,7 @@ def test_ni2008_is_the_paper_s():
     assert (paper.body, paper.method, paper.refinement, paper.particles) == ("cylinders", "hybrid", "forces", 40)
     assert (paper.defensive, paper.keep, paper.silhouettes, paper.cycles) == (0, 0, 0, 1)
     assert paper.forces.modulated
-    assert paper.forces.robust
+    assert paper.forces.rho == "quadratic"
     assert paper.forces.hierarchical
 
 
@@ -183,7 +183,7 @@ def test_what_is_wrong_is_said_with_its_place_and_what_is_possible(overrides, sa
 @pytest.mark.parametrize(("values", "said"), [
     ({"hypotheses": 1}, "hypotheses"), ({"sigma": 0}, "sigma"), ({"share": 0}, "share"), ({"shrink": 1.5}, "shrink"),
     ({"prior_weight": -1}, "prior_weight"), ({"tolerance": 2}, "tolerance"), ({"patience": 0}, "patience"), ({"rounds": 0}, "rounds"),
-    ({"sweeps": 0}, "sweeps"), ({"cycles": 1}, "unknown setting 'cycles'; there are: hypotheses, memory, patience"),
+    ({"sweeps": 0}, "sweeps"), ({"cycles": 1}, "unknown setting 'cycles'; there are: accuracy, hypotheses, memory, patience"),
 ])  # fmt: skip
 def test_what_is_wrong_in_other_tables_is_said_alike(values, said):
     with pytest.raises(SettingsError) as error:

@@ -240,11 +240,11 @@ def test_the_methods_are_those_of_table_ii():
     layers = values["particle filter, annealed"]
     assert layers.particles * layers.cycles == 1000  # as many weighings
     own = [values[way.name].forces for way in tracks.IMAGE_FORCES[1:]]
-    assert all(each.modulated and each.robust and each.hierarchical for each in own)
+    assert all(each.modulated and each.rho == "quadratic" and each.hierarchical for each in own)
     assert [each.iterations for each in own] == [12, 40, values["hybrid"].forces.iterations]
     force = values["image force, ICP"].forces
     assert not force.modulated
-    assert not force.robust
+    assert force.rho == "none"
     assert force.hierarchical
     assert not values[tracks.ALONE.name].forces.hierarchical
     assert tracks.REGIONS == 20

@@ -202,7 +202,7 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
         raise TrackingError(f"{footage.recording.path}: {error}") from None
     subject = MonocularSubject.of(fit, footage.camera, options.tracker, source, rate / options.every)
     condition = survey.look.condition if isinstance(survey.look, Look) else None
-    if condition is not None and condition.blurred and options.every == 1:
+    if condition is not None and condition.blurred and options.every == 1 and options.tracker.motion_blur:
         subject = replace(subject, tracker=replace(subject.tracker, blurred=True))
     start = subject.tracker.start(for_start, masks[0]).overlap
     other = clean.segmenter.key if clean is not survey.silhouettes[0] and clean.segmenter is not None else None

@@ -35,7 +35,7 @@ def prior_of(names, *, at=0.2, wide: float = 1e-3) -> MotionPrior:
 
 def drawn(settings, poses, prior=None, velocity=None, scale=1.0, seed=0, mismatch=lambda poses: np.zeros(len(poses))) -> np.ndarray:
     velocity = np.zeros(D) if velocity is None else velocity
-    return Proposals(SKELETON, settings, prior)(np.random.default_rng(seed), poses, POSE, velocity, mismatch, scale)
+    return Proposals(SKELETON, settings, prior)(np.random.default_rng(seed), poses, POSE, velocity, mismatch, scale)[0]
 
 
 def many(number: int = 4000) -> np.ndarray:
