@@ -138,9 +138,13 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
         return ColouredMask(mask, seen.codes[0] if seen.codes else None)
 
     def next_state(self, rng: np.random.Generator, state: State | None, observation: ColouredMask) -> State | None:
-        """The tracker's state after a mask; None before the first mask that is not empty."""
+        """The tracker's state after a mask; None before the first mask that is not empty, and, for a filter that never searches again, before
+        the first that shows a person."""
         if state is None:
-            return self.tracker.start(rng, observation.mask)._replace(colours=self.colours) if observation.mask.any() else None
+            if not observation.mask.any():
+                return None
+            found = self.tracker.start(rng, observation.mask)._replace(colours=self.colours)
+            return found if found.status != "absent" or self.tracker.settings.recover else None
         return self.tracker.step(rng, state, observation.mask, codes=observation.codes)
 
     def turned_back(self, state: State | None) -> Self:

@@ -120,7 +120,8 @@ def test_hybrid_keeps_what_image_forces_lose():
     {"posture": 0.0}, {"explore": 1.0}, {"local": 0}, {"local": 1}, {"arms": 0.0}, {"limbs": 0.0},
     {"surface": {"epsilon": 0.3, "tau": 0.1}},
     {"gauss_newton": {"coarse": 0}}, {"gauss_newton": {"fine": 0, "share": 1}}, {"refinement": "forces", "forces": {"translation": 0.7}},
-    {"refinement": "forces", "forces": {"rho": "none", "modulated": False}}, {"hull": {"rays": 600}},
+    {"refinement": "forces", "forces": {"rho": "none", "modulated": False}}, {"refinement": "forces", "forces": {"rho": "quadratic"}},
+    {"hull": {"rays": 600}}, {"select_best": False},
 ], ids=str)  # fmt: skip
 def test_every_setting_runs(overrides):
     poses, seen = actor.filmed()

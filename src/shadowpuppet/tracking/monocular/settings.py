@@ -148,7 +148,7 @@ class InitializationSettings:
     place: bool = True
     """Whether the person's place is searched for with the sizes; the paper's is known."""
     accuracy: Share = 0.0
-    """A subset is done when its cost is at most this share of the silhouette's area: the paper's end, to which it gives no value."""
+    """A subset is done when its cost is less than this share of the silhouette's area: the paper's end, to which it gives no value."""
 
 
 INITIALIZATION_PRESETS: dict[str, dict] = {

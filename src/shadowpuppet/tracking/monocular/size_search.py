@@ -164,7 +164,7 @@ class SizeSearch:
             costs = self.costs(vectors, pictures, observations)
             best, least = vectors[np.argmin(costs)], min(float(costs.min()), least)
             curve.append(least)
-            if costs.min() <= settings.accuracy * sum(observations[k].area for k in pictures):
+            if costs.min() < settings.accuracy * sum(observations[k].area for k in pictures):
                 break
             sigma *= settings.shrink
             if len(curve) > settings.patience and least > (1 - settings.tolerance) * curve[-1 - settings.patience]:
