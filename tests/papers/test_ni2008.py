@@ -14,14 +14,16 @@ from results import read_rows, read_summary
 from papers.common import runner
 from papers.common.claims import DEPENDS, Answer
 from papers.common.experiment import Request
+from papers.common.fingerprint import stale
 from papers.ni2008 import choices, figure_4, figure_6, figure_7, figure_8, inputs, measures, models, particles, table_2, tracks
-from papers.ni2008.__main__ import EXPERIMENTS, main
+from papers.ni2008.__main__ import EXPERIMENTS, fingerprint, main
 from shadowpuppet.synthetic import Ring, Scene, Spec, humaneva, synthesize
 from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 
 pytestmark = pytest.mark.whole
 
+PAGE = Path(__file__).parents[2] / "docs" / "reproduction.md"
 SEED = 3
 """Of all runs here: not the default."""
 CLAIMS = {
@@ -58,6 +60,10 @@ def case(asked) -> inputs.Case:
 
 
 # As a reader types it
+
+
+def test_the_page_s_results_are_those_of_today_s_films_and_code(asked):
+    assert stale(PAGE, "ni2008", fingerprint(asked)) == ""
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda experiment: experiment.name)
