@@ -1,5 +1,7 @@
-"""Fingerprints of what an experiment's results depend on: the film, and a short run of the methods. A page of results carries them, and a test
-compares them with today's: of results and not of source text, which changes without changing results."""
+"""Fingerprints of what an experiment's results depend on: the film, and a short run of the methods.
+
+A page of results carries them, and a test compares them with today's. Source text does not count: it changes without changing results.
+"""
 
 from __future__ import annotations
 

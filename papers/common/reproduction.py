@@ -88,13 +88,14 @@ def section(folders: Sequence[Sequence[Summary]]) -> str:
     """A paper's part of the page. Raises `ShadowPuppetError` for results of different films or programs."""
     first = folders[0]
     machine = first[0]["environment"]
-    other = [result["name"] for result in first if differences(first[0].get("fingerprint", {}), result.get("fingerprint", {}))]
+    paper, made_by = first[0]["paper"], first[0].get("fingerprint", {})
+    other = [result["name"] for result in first if differences(made_by, result.get("fingerprint", {}))]
     if other:
-        raise ShadowPuppetError(f"{other[0]}: its results are of another film or program than those of {first[0]['name']}; make them again: "
-                                f"{first[0]['command'].rpartition(' ')[0]} all")
+        raise ShadowPuppetError(f"{other[0]}: its results are of another film or program than those of {first[0]['name']}; make them "
+                                f"again: python -m papers.{paper} all")
     where = f"On {machine['cpu']}, {machine['cores']} cores, {machine['vectors']}; Python {machine['python']}, NumPy {machine['numpy']}."
-    made_by = comment(first[0]["paper"], first[0].get("fingerprint", {})) if first[0].get("fingerprint") else ""
-    parts = [made_by, where + short_warning(first), "### What the paper says, and what we got", count(first), claims(folders), contradictions(first)]
+    parts = [comment(paper, made_by) if made_by else "", where + short_warning(first), "### What the paper says, and what we got",
+             count(first), claims(folders), contradictions(first)]
     return "\n\n".join([part for part in parts if part] + [experiment(result) for result in first]) + "\n"
 
 

@@ -17,8 +17,8 @@ UNBOUNDED, LINEAR, QUADRATIC = 0, 1, 2
 def push(poses, rho, modulated, hierarchical, gains, balance, iterations, chain, limbs, rows, spheres, origin, numbers, which, room,
          vectors):  # pragma: no cover
     """Move poses (N, D), in place, by forces and moments until these balance, in at most `iterations` steps, as `Refiner.forces`
-    describes. `rho` is one of the numbers above. Without `hierarchical` only the forces on parts fixed to a joint move it; the root is translated by the forces on all parts
-    in either case."""
+    describes. `rho` is one of the numbers above. Without `hierarchical` only the forces on parts fixed to a joint move it; the root is
+    translated by the forces on all parts in either case."""
     T, screws, work, sums, force = room[1], room[2], room[3], room[6], vectors[1, :4]
     for n in range(poses.shape[0]):
         for _ in range(iterations):
