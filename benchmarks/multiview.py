@@ -65,7 +65,7 @@ def _with(**values: Any) -> dict[str, Any]:
     return {"multiview": values}
 
 
-PLAIN = {"modulated": False, "robust": False, "iterations": 160, "balance": 0.0}
+PLAIN = {"modulated": False, "rho": "none", "iterations": 160, "balance": 0.0}
 """Forces as those of Ni 2008's ref. [11], the first baseline of Table II, as `papers/ni2008/tracks.py` reads it: without normals and
 bounds, with more iterations for its one particle than forty have each."""
 FOUR, THREE = ("cam1", "cam3", "cam5", "cam7"), ("cam1", "cam3", "cam5")

@@ -83,8 +83,10 @@ def test_ni2008_is_the_paper_s():
     paper = make_multiview_settings("ni2008")
     assert (paper.body, paper.method, paper.refinement, paper.particles) == ("cylinders", "hybrid", "forces", 40)
     assert (paper.defensive, paper.keep, paper.silhouettes, paper.cycles) == (0, 0, 0, 1)
+    assert (paper.resampling, paper.select_best, paper.region, paper.velocity) == ("multinomial", False, "drawn", 0)
+    assert not paper.recover
     assert paper.forces.modulated
-    assert paper.forces.robust
+    assert paper.forces.rho == "quadratic"
     assert paper.forces.hierarchical
 
 
@@ -114,7 +116,8 @@ def test_a_preset_measures_as_algorithm_1_is_printed_and_tracks_as_the_papers():
     assert paper.initialization == InitializationSettings()
     found = printed.initialization
     assert (found.share, found.shrink, found.prior_weight, found.posture_weight, found.sweeps) == (1, 1, 0, 0, 1)
-    assert not found.memory
+    assert not (found.memory or found.place)
+    assert not (paper.tracker.recover or paper.tracker.motion_blur)
     assert make_options({"preset": "liu2011_printed", "initialization": {"memory": True}}).initialization.memory
     assert printed.smoothing == ("off", 0.0)
 
@@ -183,7 +186,7 @@ def test_what_is_wrong_is_said_with_its_place_and_what_is_possible(overrides, sa
 @pytest.mark.parametrize(("values", "said"), [
     ({"hypotheses": 1}, "hypotheses"), ({"sigma": 0}, "sigma"), ({"share": 0}, "share"), ({"shrink": 1.5}, "shrink"),
     ({"prior_weight": -1}, "prior_weight"), ({"tolerance": 2}, "tolerance"), ({"patience": 0}, "patience"), ({"rounds": 0}, "rounds"),
-    ({"sweeps": 0}, "sweeps"), ({"cycles": 1}, "unknown setting 'cycles'; there are: hypotheses, memory, patience"),
+    ({"sweeps": 0}, "sweeps"), ({"cycles": 1}, "unknown setting 'cycles'; there are: accuracy, hypotheses, memory, patience"),
 ])  # fmt: skip
 def test_what_is_wrong_in_other_tables_is_said_alike(values, said):
     with pytest.raises(SettingsError) as error:

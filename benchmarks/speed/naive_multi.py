@@ -179,7 +179,8 @@ def move_by_forces(
     pull = points - found.feet
     apart = np.linalg.norm(pull, axis=1) + 1e-9
     size = apart * (np.maximum((found.normals * normals).sum(1), 0) if settings.modulated else 1)  # m_F
-    size = np.minimum(size, settings.fine_tau) if settings.robust else size  # rho
+    size = size**2 / settings.fine_tau if settings.rho == "quadratic" else size
+    size = size if settings.rho == "none" else np.minimum(size, settings.fine_tau)
     forces = (weights * size / apart)[:, None] * pull  # eq. 32
     owner, step = np.asarray(limbs.joints)[which], np.zeros(len(pose))
     for d, dof in enumerate(body.skeleton.dofs):

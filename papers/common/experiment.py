@@ -31,6 +31,8 @@ class Request:
     """Values of the paper's own options."""
     flags: tuple[str, ...] = ()
     """Those that differ from their defaults, as on the command line."""
+    fingerprint: Mapping[str, list[float]] = field(default_factory=dict)
+    """What the results depend on (`papers.common.fingerprint`); empty for a short version."""
 
     @property
     def seeds(self) -> range:

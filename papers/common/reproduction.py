@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from papers.common.claims import ANSWERS, DEPENDS, all_of
+from papers.common.fingerprint import comment, differences
 from papers.common.plotting import LARGEST
 from papers.common.writing import markdown
 from shadowpuppet.errors import ShadowPuppetError
@@ -84,11 +85,17 @@ def read_results(folder: Path) -> list[Summary]:
 
 
 def section(folders: Sequence[Sequence[Summary]]) -> str:
-    """A paper's part of the page."""
+    """A paper's part of the page. Raises `ShadowPuppetError` for results of different films or programs."""
     first = folders[0]
     machine = first[0]["environment"]
+    paper, made_by = first[0]["paper"], first[0].get("fingerprint", {})
+    other = [result["name"] for result in first if differences(made_by, result.get("fingerprint", {}))]
+    if other:
+        raise ShadowPuppetError(f"{other[0]}: its results are of another film or program than those of {first[0]['name']}; make them "
+                                f"again: python -m papers.{paper} all")
     where = f"On {machine['cpu']}, {machine['cores']} cores, {machine['vectors']}; Python {machine['python']}, NumPy {machine['numpy']}."
-    parts = [where + short_warning(first), "### What the paper says, and what we got", count(first), claims(folders), contradictions(first)]
+    parts = [comment(paper, made_by) if made_by else "", where + short_warning(first), "### What the paper says, and what we got",
+             count(first), claims(folders), contradictions(first)]
     return "\n\n".join([part for part in parts if part] + [experiment(result) for result in first]) + "\n"
 
 

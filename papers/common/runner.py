@@ -11,15 +11,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from papers.common.experiment import Experiment, Outcome, Request
+from papers.common.fingerprint import Fingerprint
 from papers.common.writing import claims_table, markdown, write_outcome
 from shadowpuppet.errors import ShadowPuppetError, reason
 
 
 def main(paper: str, about: str, experiments: Sequence[Experiment], argv: Sequence[str] | None = None,
-         add: Callable[[argparse.ArgumentParser], object] | None = None) -> int:
+         add: Callable[[argparse.ArgumentParser], object] | None = None,
+         fingerprint: Callable[[Request], Fingerprint] | None = None) -> int:
     """Run the named experiments, or list them all; the exit code, 2 for input that cannot be used.
 
-    `add` adds the paper's own options to the parser; their values are in `Request.more`.
+    `add` adds the paper's own options to the parser; their values are in `Request.more`. `fingerprint`: of what the results depend on.
     """
     parser = _parser(paper, about, experiments)
     own = set(vars(parser.parse_args([])))
@@ -37,6 +39,7 @@ def main(paper: str, about: str, experiments: Sequence[Experiment], argv: Sequen
     request = Request(args.output, tuple(args.recording), 1, args.seed, args.short, args.workers, _tell, more, flags)
     try:
         _make_folder(request.output)
+        request = request if fingerprint is None or args.short else replace(request, fingerprint=fingerprint(request))
         for name in dict.fromkeys(known if "all" in args.names else args.names):
             run(paper, known[name], replace(request, runs=args.runs or _runs(known[name], args.short)), list(known).index(name))
     except ShadowPuppetError as error:

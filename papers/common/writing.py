@@ -32,7 +32,8 @@ def summary(paper: str, experiment: Experiment, request: Request, outcome: Outco
     return {
         "paper": paper, "name": experiment.name, "title": experiment.title, "command": command(paper, experiment, request),
         "short": request.short, "recordings": [path.name for path in request.recordings] or ["made"], "seed": request.seed,
-        "runs": request.runs, "settings": outcome.settings, "takes": experiment.takes, "seconds": round(seconds, 1),
+        "runs": request.runs, "fingerprint": dict(request.fingerprint), "settings": outcome.settings, "takes": experiment.takes,
+        "seconds": round(seconds, 1),
         "environment": environment(), "said": outcome.said, "claims": [verdict.plain() for verdict in outcome.verdicts],
         "tables": {name: {"columns": list(table.columns), "rows": [list(row) for row in table.rows]}
                    for name, table in outcome.tables.items() if table.shown},

@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from papers.common.experiment import Experiment
+from papers.common.experiment import Experiment, Request
+from papers.common.fingerprint import FRAMES, Fingerprint, sums, sums_of_spec
 from papers.common.runner import main as run_main
-from papers.ni2008 import choices, figure_4, figure_5, figure_6, figure_7, figure_8, models, particles, table_1, table_2
+from papers.ni2008 import choices, figure_4, figure_5, figure_6, figure_7, figure_8, inputs, models, particles, table_1, table_2, tracks
 
 ABOUT = ("Ni, Kassim and Winkler 2008: walking, jogging and boxing before seven cameras. Without --recording, recordings like HumanEva's "
          "are made first, some five minutes each on a core, once; --drawn does without films.")
@@ -38,9 +40,22 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--subject", default="S2", help="of HumanEva; the paper's is S2")
 
 
+def fingerprint(request: Request) -> Fingerprint:
+    """Of each made recording: its spec; truth and surface points of its short version, and its first poses by each method."""
+    found, short = Fingerprint(), replace(request, short=True, recordings=(), more={})
+    ways = (tracks.HYBRID, tracks.IMAGE_FORCES[-1], tracks.particle_filter(200))
+    for source in inputs.sources(short):
+        case = inputs.load(short, source)
+        assert source.spec is not None
+        found[f"{source.name}: spec"] = sums_of_spec(replace(source.spec, frames=None, training_frames=None))
+        found[f"{source.name}: truth"], found[f"{source.name}: points"] = sums(case.truth.positions), sums(case.arrays["points"].mean(0))
+        found |= {f"{source.name}: {way.name}": sums(tracks.follow(case, way, 0).poses[:FRAMES]) for way in ways}
+    return found
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run what is asked for."""
-    return run_main("ni2008", ABOUT, EXPERIMENTS, argv, add)
+    return run_main("ni2008", ABOUT, EXPERIMENTS, argv, add, fingerprint)
 
 
 if __name__ == "__main__":

@@ -97,7 +97,7 @@ def figure_2(request: Request) -> Outcome:
     foot, normal = near.feet[0], near.normals[0]
     away = point - foot
     cosine = float(normal @ away / np.linalg.norm(away))
-    force = away / np.linalg.norm(away) * min(cosine * float(np.linalg.norm(away)), settings.forces.fine_tau)
+    force = away / np.linalg.norm(away) * rho(cosine * float(np.linalg.norm(away)), settings.forces.fine_tau)
     moment = np.cross(foot - elbow[:3, 3], force)
     plane = np.stack([along, across])
     figure = _force_picture(limbs, s, plane @ (point - elbow[:3, 3]), plane @ (foot - elbow[:3, 3]), plane @ force)
@@ -105,6 +105,11 @@ def figure_2(request: Request) -> Outcome:
     told = {"point_m": list(POINT), "tau_m": settings.forces.fine_tau}
     return Outcome(told, {"figure_2": figure}, {"figure_2": Table(("what", "x", "y", "z"), rows, True)},
                    said=[told_of(away, settings.forces.fine_tau, moment)])  # fmt: skip
+
+
+def rho(distance: float, tau: float) -> float:
+    """The robust function of eq. 32, a truncated quadratic, divided by tau, metres."""
+    return min(distance**2, tau**2) / tau
 
 
 def told_of(away: Array, tau: float, moment: Array) -> str:

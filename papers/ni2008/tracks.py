@@ -56,7 +56,7 @@ class Way:
 
 HYBRID = Way("hybrid")
 ONE = {"method": "image_force", "velocity": 0.0}
-ICP = {"modulated": False, "robust": False, "iterations": 160, "balance": 0.0}
+ICP = {"modulated": False, "rho": "none", "iterations": 160, "balance": 0.0}
 """Forces as those of ref. [11]: no normals, no bound. Its dynamics, too, pass a force on along the limbs, which here are the sums over what
 hangs on a joint; with these left out each joint feels its own part alone. Iterations: in Table II the image force's frame takes an eighth
 to a fifth of the hybrid's, with a fortieth of the particles."""

@@ -18,6 +18,7 @@ COMMANDS = {
 SETTINGS = {
     "silhouette.maintain": "the background no longer follows lasting changes: leave them out with --region, or take masks of another "
                            "program (shadowpuppet masks)",
+    "multiview.forces.robust": "the bound of forces is rho: multiview.forces.rho = \"none\", \"linear\" or \"quadratic\"",
     "silhouette.method = knn": "found knn, which is gone; mog2 does the same as well, and auto better",
     **{f"like = humaneva_{motion}": f"humaneva_{motion} has moved: papers/ni2008/recordings.py in the source repository makes its spec"
        for motion in ("walking", "jogging", "boxing")},
@@ -28,7 +29,7 @@ BOUGUET = ("found a calibration of Bouguet's toolbox, which is not read any more
            "HumanEva becomes a recording by python -m papers.humaneva in the source repository")
 FILES = dict.fromkeys((".cal", ".m", ".mat"), BOUGUET)
 """By the ending of a calibration file."""
-IDLE: dict[str, object] = {"silhouette.maintain": False}
+IDLE: dict[str, object] = {"silhouette.maintain": False, "multiview.forces.robust": True}
 """By the name of a removed setting: the value that changed nothing. Files of earlier versions hold it, and it is left out."""
 
 

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from papers.common import plotting, reproduction, sources
+from papers.common import fingerprint, plotting, reproduction, sources
 from papers.common.claims import DEPENDS, Share, Verdict, all_of, by_reading, difference, opposite
 from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.common.many import run_all
@@ -282,6 +282,40 @@ def test_long_tables_stay_in_the_results_unless_the_paper_has_them(tmp_path):
     found["tables"] = {"long": {"columns": ["n"], "rows": [[n] for n in range(reproduction.LONGEST + 1)]}}
     assert "| n |" not in reproduction.experiment(found)
     assert "| n |" in reproduction.experiment(found | {"name": "table_2"})
+
+
+def test_a_page_names_the_film_and_program_that_it_is_of_and_is_refused_when_these_are_others(tmp_path, docs):
+    page, made_by = docs / "reproduction.md", {"film": [0.25, 3.0], "DRS": [1.5]}
+    assert "no fingerprint, and no warning" in fingerprint.stale(page, "tests", made_by)
+    assert reproduction.main([str(results(tmp_path / "a", 1, fingerprint=made_by)), "--docs", str(docs)]) == 0
+    assert fingerprint.of_page(page, "tests") == made_by
+    assert fingerprint.stale(page, "tests", {"film": [0.25, 3.0 + 1e-6], "DRS": [1.5]}) == ""
+    said = fingerprint.stale(page, "tests", {"film": [0.25, 3.1], "DRS": [1.5], "SRS": [0.0]})
+    assert "of other films or programs (film, SRS); make them again: python -m papers.tests all -o FOLDER" in said
+    page.write_text(PAGE.replace("as it was", f"{fingerprint.WARNING}."), "utf-8")
+    assert fingerprint.stale(page, "tests", made_by) == ""
+
+
+def test_results_of_different_films_are_no_page(tmp_path, docs, capsys):
+    folder = results(tmp_path / "a", 1, fingerprint={"film": [1.0]})
+    run("tests", EXPERIMENTS[1], Request(folder, fingerprint={"film": [2.0]}), 1)
+    assert reproduction.main([str(folder), "--docs", str(docs)]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "again: its results are of another film or program than those of tried; make them again: python -m papers.tests all" in said
+    assert (docs / "reproduction.md").read_text("utf-8") == PAGE
+
+
+def test_a_full_run_takes_the_fingerprint_and_a_short_one_does_not(tmp_path):
+    for flags, wanted in (([], {"film": [1.0]}), (["--short"], {})):
+        folder = tmp_path / f"out{len(flags)}"
+        assert main("tests", "About.", EXPERIMENTS, ["tried", *flags, "-o", str(folder)], fingerprint=lambda _: {"film": [1.0]}) == 0
+        assert json.loads((folder / "tried.json").read_text("utf-8"))["fingerprint"] == wanted
+
+
+def test_sums_tell_apart_what_differs(rng):
+    values = rng.normal(size=(20, 12))
+    assert fingerprint.sums(values) == fingerprint.sums(values + 1e-12)
+    assert fingerprint.differences({"a": fingerprint.sums(values)}, {"a": fingerprint.sums(values + 0.01)}) == ["a"]
 
 
 def test_short_results_are_reported_as_such(tmp_path, docs):

@@ -15,6 +15,7 @@ from results import read_rows, read_summary
 
 from papers.common.claims import DEPENDS
 from papers.common.experiment import Request
+from papers.common.fingerprint import differences, stale
 from papers.liu2011 import (
     cardbox_cost,
     figure_5,
@@ -31,13 +32,14 @@ from papers.liu2011 import (
     toward_camera,
     true_poses,
 )
-from papers.liu2011.__main__ import EXPERIMENTS, run
+from papers.liu2011.__main__ import EXPERIMENTS, fingerprint, run
 from papers.liu2011.sweeps import Measured
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.tracking.monocular.settings import make_settings
 
 pytestmark = pytest.mark.whole
 
+PAGE = Path(__file__).parents[2] / "docs" / "reproduction.md"
 SEED = 5
 """Of all runs here: not the default."""
 
@@ -57,6 +59,18 @@ def request_(out) -> Request:
 
 
 # As a reader types it
+
+
+def test_the_page_s_results_are_those_of_today_s_films_and_code(request_):
+    assert stale(PAGE, "liu2011", fingerprint(request_)) == ""
+
+
+def test_a_change_of_the_filter_or_of_the_person_is_another_fingerprint(request_, monkeypatch):
+    today = fingerprint(request_)
+    seeds = np.random.default_rng
+    monkeypatch.setattr(repeats.np.random, "default_rng", lambda seed=None: seeds([2012, 0] if seed == [2011, 0] else seed))
+    other = differences(today, fingerprint(request_))
+    assert set(other) == {f"{name}: {method}" for name in material.MADE for method in repeats.METHODS}
 
 
 @pytest.mark.parametrize("name", [experiment.name for experiment in EXPERIMENTS])

@@ -14,8 +14,9 @@ from results import read_rows, read_summary
 from papers.common import runner
 from papers.common.claims import DEPENDS, Answer
 from papers.common.experiment import Request
+from papers.common.fingerprint import stale
 from papers.ni2008 import choices, figure_4, figure_6, figure_7, figure_8, inputs, measures, models, particles, table_2, tracks
-from papers.ni2008.__main__ import EXPERIMENTS, main
+from papers.ni2008.__main__ import EXPERIMENTS, fingerprint, main
 from papers.ni2008.recordings import humaneva
 from shadowpuppet.synthetic import Ring, Scene, Spec, synthesize
 from shadowpuppet.synthetic.recording import perform
@@ -24,6 +25,7 @@ from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 
 pytestmark = pytest.mark.whole
 
+PAGE = Path(__file__).parents[2] / "docs" / "reproduction.md"
 SEED = 3
 """Of all runs here: not the default."""
 CLAIMS = {
@@ -60,6 +62,10 @@ def case(asked) -> inputs.Case:
 
 
 # As a reader types it
+
+
+def test_the_page_s_results_are_those_of_today_s_films_and_code(asked):
+    assert stale(PAGE, "ni2008", fingerprint(asked)) == ""
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda experiment: experiment.name)
@@ -242,11 +248,11 @@ def test_the_methods_are_those_of_table_ii():
     layers = values["particle filter, annealed"]
     assert layers.particles * layers.cycles == 1000  # as many weighings
     own = [values[way.name].forces for way in tracks.IMAGE_FORCES[1:]]
-    assert all(each.modulated and each.robust and each.hierarchical for each in own)
+    assert all(each.modulated and each.rho == "quadratic" and each.hierarchical for each in own)
     assert [each.iterations for each in own] == [12, 40, values["hybrid"].forces.iterations]
     force = values["image force, ICP"].forces
     assert not force.modulated
-    assert not force.robust
+    assert force.rho == "none"
     assert force.hierarchical
     assert not values[tracks.ALONE.name].forces.hierarchical
     assert tracks.REGIONS == 20

@@ -138,9 +138,13 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
         return ColouredMask(mask, seen.codes[0] if seen.codes else None)
 
     def next_state(self, rng: np.random.Generator, state: State | None, observation: ColouredMask) -> State | None:
-        """The tracker's state after a mask; None before the first mask that is not empty."""
+        """The tracker's state after a mask; None before the first mask that is not empty, and, for a filter that never searches again, before
+        the first that shows a person."""
         if state is None:
-            return self.tracker.start(rng, observation.mask)._replace(colours=self.colours) if observation.mask.any() else None
+            if not observation.mask.any():
+                return None
+            found = self.tracker.start(rng, observation.mask)._replace(colours=self.colours)
+            return found if found.status != "absent" or self.tracker.settings.recover else None
         return self.tracker.step(rng, state, observation.mask, codes=observation.codes)
 
     def turned_back(self, state: State | None) -> Self:
@@ -202,7 +206,7 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
         raise TrackingError(f"{footage.recording.path}: {error}") from None
     subject = MonocularSubject.of(fit, footage.camera, options.tracker, source, rate / options.every)
     condition = survey.look.condition if isinstance(survey.look, Look) else None
-    if condition is not None and condition.blurred and options.every == 1:
+    if condition is not None and condition.blurred and options.every == 1 and options.tracker.motion_blur:
         subject = replace(subject, tracker=replace(subject.tracker, blurred=True))
     start = subject.tracker.start(for_start, masks[0]).overlap
     other = clean.segmenter.key if clean is not survey.silhouettes[0] and clean.segmenter is not None else None

@@ -92,7 +92,8 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
         if people == 0 or (state is None and people < 2):
             return None
         if state is None:
-            return self.tracker.start(rng, points, seen.masks, facing=None if self.front is None else self.front.heading_in(points))
+            found = self.tracker.start(rng, points, seen.masks, facing=None if self.front is None else self.front.heading_in(points))
+            return found if found.status != "absent" or self.tracker.settings.recover else None
         return self.tracker.step(rng, state, points, seen.masks, codes=seen.codes)
 
     def left_out(self, state: MultiviewState | None) -> tuple[Mask | None, ...]:

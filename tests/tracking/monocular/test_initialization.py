@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -163,6 +164,26 @@ def test_a_search_stops_when_nothing_is_gained():
     eager = InitializationSettings(tolerance=0.0, patience=1, rounds=7, sweeps=1)
     fit = fit_references(np.random.default_rng(0), CAMERA, references(), height=1.78, distance=2.8, settings=eager)
     assert max(len(curve) for curves in fit.curves.values() for curve in curves) <= 7
+
+
+def test_a_search_ends_where_the_accuracy_is_reached_and_keeps_that_round():
+    """Algorithm 1's own end; without it the last round counts, better or worse."""
+    wild = InitializationSettings(hypotheses=30, share=1.0, shrink=1.0, prior_weight=0.0, sweeps=1, memory=False, patience=30, rounds=30)
+    easy, never = (fit_references(np.random.default_rng(0), CAMERA, references("cardbox"), height=1.78, distance=2.8, body="cardbox",
+                                  settings=replace(wild, accuracy=accuracy)) for accuracy in (0.3, 0.0))
+    assert [len(curve) for (curve,) in easy.curves.values()] < [len(curve) for (curve,) in never.curves.values()]
+    areas = [int(mask.sum()) for mask in references("cardbox").values()]
+    assert all(curve[-1] <= 0.3 * area for (curve,), area in zip(easy.curves.values(), areas))
+
+
+def test_a_known_place_is_held():
+    held, free = (fit_references(np.random.default_rng(0), CAMERA, references(), height=1.78, distance=2.8,
+                                 settings=replace(QUICK, place=place)) for place in (False, True))
+    assert held.guess.distance == 2.8
+    assert held.guess.elevation != free.guess.elevation
+    again = fit_references(np.random.default_rng(1), CAMERA, references(), height=1.78, distance=2.8, settings=replace(QUICK, place=False))
+    assert held.guess.elevation == again.guess.elevation
+    np.testing.assert_array_equal(held.poses, again.poses)
 
 
 def test_sizes_stay_possible_whatever_is_drawn():

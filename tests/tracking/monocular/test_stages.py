@@ -56,6 +56,29 @@ def test_parts_that_are_moved_at_once(name, number, dofs):
     np.testing.assert_array_equal(joined.sigma, expected)
 
 
+# How a stage selects (eq. 8, Algorithms 3 and 4)
+
+
+def selected(rank_by: str, resampling: str = "deterministic") -> np.ndarray:
+    """Of six particles whose costs in the last picture rise, and in the new one fall, but for the fifth, which costs least there."""
+    of = stage(rank_by=rank_by, resampling=resampling, arm={"survival": 0.5})
+    known, new = -np.arange(6.0), np.array([-6.0, -5, -4, -3, 0, -1])
+    particles = Particles(np.zeros((6, len(of.dofs))), -known, known)
+    return of.selection(particles, lambda poses: (-new, new))(np.random.default_rng(0), known, 6)
+
+
+def test_ranked_by_the_last_picture_the_new_one_or_the_new_one_for_the_best_alone():
+    assert selected("last").tolist() == [0, 1, 2, 0, 0, 0]
+    assert selected("new").tolist() == [4, 5, 3, 4, 4, 4]
+    assert selected("best_new").tolist() == [4, 1, 2, 4, 4, 4]  # the survivors are those of the known costs
+
+
+def test_algorithm_3_draws_by_the_known_weights_beside_the_best_in_the_new_picture():
+    last, best_new = selected("last", "stratified"), selected("best_new", "stratified")
+    assert (last[0], best_new[0]) == (0, 4)
+    np.testing.assert_array_equal(best_new[1:], last[1:])
+
+
 @pytest.mark.parametrize("name", ["legs", "torso+legs", "", "torso+", "left", "Torso"])
 def test_an_unknown_part_is_said_with_those_there_are(name):
     with pytest.raises(SettingsError, match=r"stages: unknown part '.*' in '.*'; there are: left_arm, right_arm, torso"):

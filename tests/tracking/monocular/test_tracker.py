@@ -185,7 +185,7 @@ def test_an_arm_s_stage_sees_the_new_torso_and_the_other_arm_as_it_was(monkeypat
 
 
 @pytest.mark.parametrize(("overrides", "evaluations"), [
-    ({}, 600), ({"rank_by": "new"}, 1200), ({"cycles": 3}, 1800), ({"cycles": 2, "explore": 10}, 1230), ({"stages": ("torso",)}, 200),
+    ({}, 600), ({"rank_by": "new"}, 1200), ({"rank_by": "best_new"}, 1200), ({"cycles": 3}, 1800), ({"cycles": 2, "explore": 10}, 1230), ({"stages": ("torso",)}, 200),
 ])  # fmt: skip
 def test_how_many_particles_a_frame_evaluates(monkeypatch, overrides, evaluations):
     """Ranked by known costs, or evaluated again in the new picture (eq. 8 as printed), which doubles the work."""
@@ -214,7 +214,7 @@ def test_every_resampling_follows(resampling):
 @pytest.mark.parametrize("overrides", [
     {"stages": FLAT}, {"stages": ("torso", "left_arm+right_arm")}, {"stages": ("torso",)}, {"stages": ("right_arm", "torso", "left_arm")},
     {"torso": {"particles": 2}, "arm": {"particles": 3}}, {"torso": {"particles": 31}, "arm": {"particles": 500}}, {"cycles": 7},
-    {"explore": 0}, {"explore": 1}, {"rank_by": "new"}, {"torso_arms": "last"}, {"estimate": "mean"}, {"estimate": "best"},
+    {"explore": 0}, {"explore": 1}, {"rank_by": "new"}, {"rank_by": "best_new"}, {"torso_arms": "last"}, {"estimate": "mean"}, {"estimate": "best"},
     {"limits": False}, {"ignore_legs": False}, {"arm": {"survival": 0.0}}, {"arm": {"survival": 1.0}}, {"motion_weight": 0.0},
 ])  # fmt: skip
 @pytest.mark.parametrize("preset", ["liu2011", "default"])
@@ -265,7 +265,7 @@ def test_nobody_is_absent_and_the_pose_waits():
 def test_who_is_not_there_at_the_start_is_absent_and_found_when_they_come(preset):
     masks = wave(3)[1]
     for nobody in (np.zeros_like(masks[0]), block(0.002)):
-        states = track(tracker(preset), [nobody, nobody, *masks])
+        states = track(tracker(preset, recover=True), [nobody, nobody, *masks])
         assert [state.status for state in states] == ["absent"] * 2 + ["tracked"] * 3
         assert np.isnan(states[0].cost)
         assert states[0].overlap == 0
@@ -292,7 +292,7 @@ def test_masks_may_be_of_numbers_too():
 def test_who_comes_back_elsewhere_is_found(preset):
     masks, nobody = wave(4)[1], np.zeros((120, 160), bool)
     poses, back = wave(6, y=0.45)
-    states = track(tracker(preset), [*masks, nobody, nobody, *back])
+    states = track(tracker(preset, recover=True), [*masks, nobody, nobody, *back])
     assert [state.status for state in states] == ["tracked"] * 4 + ["absent"] * 2 + ["tracked"] * 6
     assert abs(states[-1].pose[0] - poses[-1][0]) < 0.06
 
@@ -308,7 +308,7 @@ def test_something_else_in_the_picture_is_not_tracked():
 
 def test_who_was_lost_is_found_again():
     masks, back = wave(3)[1], wave(4, y=-0.4)[1]
-    states = track(tracker(), [*masks, block(0.05), *back])
+    states = track(tracker(recover=True), [*masks, block(0.05), *back])
     assert states[3].status == "lost"
     assert {state.status for state in states[4:]} == {"tracked"}
 

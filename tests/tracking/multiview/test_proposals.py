@@ -35,7 +35,7 @@ def prior_of(names, *, at=0.2, wide: float = 1e-3) -> MotionPrior:
 
 def drawn(settings, poses, prior=None, velocity=None, scale=1.0, seed=0, mismatch=lambda poses: np.zeros(len(poses))) -> np.ndarray:
     velocity = np.zeros(D) if velocity is None else velocity
-    return Proposals(SKELETON, settings, prior)(np.random.default_rng(seed), poses, POSE, velocity, mismatch, scale)
+    return Proposals(SKELETON, settings, prior)(np.random.default_rng(seed), poses, POSE, velocity, mismatch, scale)[0]
 
 
 def many(number: int = 4000) -> np.ndarray:
@@ -159,6 +159,31 @@ def test_the_next_region_follows_the_one_that_the_pose_lies_in():
     poses[3:, SKELETON.dof_indices(names)] = 0.75
     found = drawn(replace(HYBRID, defensive=0.0), poses, prior)
     np.testing.assert_allclose(found[:, SKELETON.dof_indices(names[1:])][:, 0], [0.8] * 3 + [0.2] * 3)
+
+
+def test_the_region_that_was_drawn_stays_a_particle_s_own_where_the_settings_carry_it():
+    """Ni 2008, V-A: the state s is drawn before refinement; the refined pose may lie in another region."""
+    names = ["left_knee_flexion", "right_knee_flexion", "chest_y"]
+    poses, carried = many(6), np.array([1, 1, 0, 0, 0, 1])
+    poses[:, SKELETON.dof_indices(names)] = 0.25  # nearest to region 0
+    propose, of = Proposals(SKELETON, replace(HYBRID, defensive=0.0, region="drawn"), two_regions(names)), SKELETON.dof_indices(["chest_y"])
+    given = np.random.default_rng(0), poses, POSE, np.zeros(D), lambda poses: np.zeros(len(poses))
+    found, regions = propose(*given, regions=carried)
+    np.testing.assert_array_equal(regions, 1 - carried)
+    np.testing.assert_allclose(found[:, of][:, 0], np.where(regions, 0.8, 0.2))
+    np.testing.assert_array_equal(propose(*given)[1], 1)  # those of a first frame follow from the poses
+    assert Proposals(SKELETON, replace(HYBRID, defensive=0.0), two_regions(names))(*given)[1] is None
+
+
+def test_a_pose_by_noise_lies_in_the_nearest_region():
+    names = ["left_knee_flexion", "right_knee_flexion", "chest_y"]
+    poses, settings = many(6), replace(HYBRID, defensive=0.5, region="drawn")
+    poses[:, SKELETON.dof_indices(names)] = 0.75
+    last = poses[0]
+    found, regions = Proposals(SKELETON, settings, two_regions(names))(
+        np.random.default_rng(0), poses, last, np.zeros(D), lambda poses: np.zeros(len(poses)), regions=np.zeros(6, np.int64))
+    assert found.shape == (6, D)
+    np.testing.assert_array_equal(regions, 1)  # the first three by where they lie, the others by the transition from 0
 
 
 def test_a_prior_of_all_moves_the_place_too():

@@ -120,7 +120,8 @@ def test_hybrid_keeps_what_image_forces_lose():
     {"posture": 0.0}, {"explore": 1.0}, {"local": 0}, {"local": 1}, {"arms": 0.0}, {"limbs": 0.0},
     {"surface": {"epsilon": 0.3, "tau": 0.1}},
     {"gauss_newton": {"coarse": 0}}, {"gauss_newton": {"fine": 0, "share": 1}}, {"refinement": "forces", "forces": {"translation": 0.7}},
-    {"refinement": "forces", "forces": {"robust": False, "modulated": False}}, {"hull": {"rays": 600}},
+    {"refinement": "forces", "forces": {"rho": "none", "modulated": False}}, {"refinement": "forces", "forces": {"rho": "quadratic"}},
+    {"hull": {"rays": 600}}, {"select_best": False},
 ], ids=str)  # fmt: skip
 def test_every_setting_runs(overrides):
     poses, seen = actor.filmed()
@@ -189,9 +190,9 @@ def test_each_cycle_has_less_noise_than_the_last():
     state, scales = of.start(np.random.default_rng(0), *seen[0]), []
     proposals = of.proposals
 
-    def recorded(rng, particles, last, velocity, mismatch, scale=1.0):
+    def recorded(rng, particles, last, velocity, mismatch, scale=1.0, regions=None):
         scales.append((scale, velocity.any()))
-        return proposals(rng, particles, last, velocity, mismatch, scale)
+        return proposals(rng, particles, last, velocity, mismatch, scale, regions)
 
     of.__dict__["proposals"] = recorded
     of.cycle(np.random.default_rng(0), state._replace(velocity=np.ones_like(state.pose)), MultiviewObservation(of.views, *seen[1]))

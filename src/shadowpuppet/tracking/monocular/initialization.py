@@ -80,8 +80,9 @@ def fit_references(rng: np.random.Generator, camera: Camera, references: Mapping
                 continue
             k = names.index(view)
             free = [*sizes, *(SUBSETS["O3"] if subset == "O1" and sweep else ())]
-            columns = np.concatenate([search.columns(free, distance=distance is None and subset != "O2"),
-                                      search.pose_columns(k, side)])
+            columns = search.columns(free, distance=distance is None and subset != "O2", height=settings.place)
+            if settings.place:
+                columns = np.concatenate([columns, search.pose_columns(k, side)])
             curve = search.search(rng, columns, [k], settings, settings.sigma / 2**sweep)
             curves.setdefault(subset, []).append(tuple(curve))
     return _fit(search, names, curves)

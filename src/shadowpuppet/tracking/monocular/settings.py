@@ -53,9 +53,9 @@ class MonocularSettings:
     """Factor of the noise from one cycle to the next."""
     explore: Annotated[int, Field(ge=0, le=100_000)] = 500
     """Candidates from a part's whole range, added to the particles in each frame's first cycle."""
-    rank_by: Literal["last", "new"] = "last"
-    """Costs that rank and weigh the particles before resampling: those in the last picture, or computed again in the new one (eq. 8 as
-    printed), which doubles the evaluations."""
+    rank_by: Literal["last", "new", "best_new"] = "last"
+    """Costs that rank and weigh the particles before resampling: those in the last picture; computed again in the new one, as eq. 8 prints,
+    which doubles the evaluations; or again for the choice of the best only, as Algorithm 3 prints."""
     torso_arms: Literal["last", "hidden"] = "hidden"
     """How the torso's stage draws the arms: as last estimated, moving with the torso, or not at all."""
     estimate: Literal["best", "mean"] = "mean"
@@ -74,6 +74,8 @@ class MonocularSettings:
     unlike those of the clothes."""
     recover: bool = True
     """Search for the person again after a loss or an absence. The papers' filters continue from their last particles."""
+    motion_blur: bool = True
+    """Whether a film may be found to be blurred by motion; what its silhouettes cover since this frame only then does not count."""
     turned: bool = True
     """Search for a person who is turned, and with a whole body sits, kneels or squats, where one who faces the camera fits badly."""
     patience: NonNegative = 1.0
@@ -100,6 +102,8 @@ PRESETS: dict[str, dict] = {
         "motion_weight": 0.0,
         "posture_weight": 0.0,
         "arm_colours": False,
+        "recover": False,
+        "motion_blur": False,
         "turned": False,
         "patience": 0.0,
         "both_ways": False,
@@ -141,11 +145,16 @@ class InitializationSettings:
     """Number of passes through the three subsets. From the second on, the first subset's search varies the third's sizes, too."""
     memory: bool = True
     """Whether a round begins with the best hypothesis of all rounds; in the paper it is the best of the last round, better or worse."""
+    place: bool = True
+    """Whether the person's place is searched for with the sizes; the paper's is known."""
+    accuracy: Share = 0.0
+    """A subset is done when its cost is less than this share of the silhouette's area: the paper's end, to which it gives no value."""
 
 
 INITIALIZATION_PRESETS: dict[str, dict] = {
     "default": {},
-    "liu2011_printed": {"share": 1.0, "shrink": 1.0, "prior_weight": 0.0, "posture_weight": 0.0, "sweeps": 1, "memory": False},
+    "liu2011_printed": {"share": 1.0, "shrink": 1.0, "prior_weight": 0.0, "posture_weight": 0.0, "sweeps": 1, "memory": False,
+                        "place": False, "accuracy": 0.1},
 }
 """Named settings of the sizes' search, as `PRESETS`: "liu2011_printed" is Algorithm 1 as the paper prints it. It needs reference pictures:
 without a prior of the sizes, other pictures do not determine them."""

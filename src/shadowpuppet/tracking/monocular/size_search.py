@@ -106,10 +106,11 @@ class SizeSearch:
         self.index = SearchVector.of(np.arange(len(self.vector))[None], self.dofs)
         self.limits = self.bodies.body.skeleton.limits
 
-    def columns(self, sizes: Sequence[str], *, distance: bool = False) -> NDArray[np.int64]:
+    def columns(self, sizes: Sequence[str], *, distance: bool = False, height: bool = True) -> NDArray[np.int64]:
         """Indices in the vector of some sizes and of the body's place."""
         toward, up = self.index.shift[0]
-        return np.array([*(self.index.sizes[0, SIZE_NAMES.index(name)] for name in sizes), *([toward] if distance else []), up])
+        place = [column for column, free in ((toward, distance), (up, height)) if free]
+        return np.array([*(self.index.sizes[0, SIZE_NAMES.index(name)] for name in sizes), *place])
 
     def pose_columns(self, picture: int, dofs: NDArray[np.int64]) -> NDArray[np.int64]:
         """Indices in the vector of some DOF of a picture's pose."""
@@ -163,6 +164,8 @@ class SizeSearch:
             costs = self.costs(vectors, pictures, observations)
             best, least = vectors[np.argmin(costs)], min(float(costs.min()), least)
             curve.append(least)
+            if costs.min() < settings.accuracy * sum(observations[k].area for k in pictures):
+                break
             sigma *= settings.shrink
             if len(curve) > settings.patience and least > (1 - settings.tolerance) * curve[-1 - settings.patience]:
                 break

@@ -10,7 +10,7 @@ from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.particle_filter import Particles, Propose, Weigh, diffuse
-from shadowpuppet.tracking.resampling import Scheme, make_scheme, with_best
+from shadowpuppet.tracking.resampling import Indices, Scheme, make_scheme, with_best
 from shadowpuppet.tracking.silhouette_cost import Cost, Observation, PartialCost
 
 
@@ -62,6 +62,22 @@ class FilterStage:
         whether the silhouette is too narrow for the trunk as it was, which only the extended stage uses."""
         sigma = self.sigma * self.settings.cooling**cycle
         return lambda rng, values: self.clamp(diffuse(rng, values, sigma))
+
+    def selection(self, particles: Particles, weigh: Weigh) -> Scheme:
+        """The resampling of last frame's particles (Algorithms 3 and 4), by what `rank_by` reads eq. 8 to mean. `weigh`: in this frame."""
+        if self.settings.rank_by == "last":
+            return self.resample
+        again = weigh(particles.poses)[1]
+        if self.settings.rank_by == "new":
+            return lambda rng, _, number: self.resample(rng, again, number)
+        copies_of_best = self.settings.resampling == "deterministic"
+
+        def select(rng: np.random.Generator, log_weights: Array, number: int) -> Indices:
+            ancestors = self.resample(rng, log_weights, number)
+            best = ancestors == ancestors[0] if copies_of_best else np.arange(number) == 0
+            return np.where(best, again.argmax(), ancestors)
+
+        return select
 
     def weigh(self, observation: Observation, others: Array, last: Array) -> Weigh:
         """The function from values (N, d) to costs (N,) and log weights (N,).

@@ -110,9 +110,8 @@ class MonocularTracker:
             others = estimate  # values of the DOF outside a stage; later stages see the torso's new estimate, but not a limb's
             for i, stage in enumerate(self.stages):
                 weigh = stage.weigh(observation, others, last)
-                ranked = evaluate(particles[i].poses, weigh) if self.settings.rank_by == "new" else particles[i]  # eq. 8 as printed
-                propose = stage.propose(cycle, narrow)
-                particles[i] = step(rng, ranked, resample=stage.resample, propose=propose, weigh=weigh, number=stage.number)
+                select, propose = stage.selection(particles[i], weigh), stage.propose(cycle, narrow)
+                particles[i] = step(rng, particles[i], resample=select, propose=propose, weigh=weigh, number=stage.number)
                 estimate = stage.put(estimate, stage.estimate(particles[i]))
                 others = estimate if stage.moves_torso else others
         return self.judge(estimate, particles, whole)

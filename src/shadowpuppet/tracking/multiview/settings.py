@@ -86,8 +86,9 @@ class ForceSettings:
     """Gain of the rotations; less than 1 because a joint and those below it turn at the same time."""
     modulated: bool = True
     """Whether forces are multiplied by the cosine between the normals, and zero where it is negative."""
-    robust: bool = True
-    """Whether the size of a force is bounded."""
+    rho: Literal["none", "linear", "quadratic"] = "linear"
+    """How the size of a force grows with the distance (rho of eq. 32): without bound, linearly up to the bound, or quadratically up to it,
+    as in the paper."""
     hierarchical: bool = True
     """Whether a joint is turned by the moments on all parts below it, or only by those on its own parts."""
 
@@ -106,8 +107,13 @@ class MultiviewSettings:
     """Number of particles, N. Default: 16 with six cameras or more, 24 with five, 40 with fewer, which show less and are faster to draw."""
     resampling: Literal["stratified", "systematic", "multinomial", "residual"] = "systematic"
     """How particles are selected by their weights."""
+    select_best: bool = True
+    """Whether selection always takes the best particle and draws the others; the paper draws all."""
     defensive: Share = 0.5
     """Share of proposals that are the last poses with noise instead of the motion prior's, for motion that the prior does not contain."""
+    region: Literal["nearest", "drawn"] = "nearest"
+    """The region of the motion prior (state s) in which a particle lies: the one nearest to its refined pose, or the one that was drawn for
+    it, as in the paper."""
     keep: Share = 0.5
     """Share of a pose's offset from the prior's subspace that a proposal keeps."""
     sigma_rotation: Positive = 0.15
@@ -197,11 +203,14 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "body": "cylinders",
         "refinement": "forces",
         "particles": 40,
+        "resampling": "multinomial",
+        "select_best": False,
         "defensive": 0.0,
+        "region": "drawn",
         "keep": 0.0,
         "explore": 0.0,
         "local": 0,
-        "velocity": 1.0,
+        "velocity": 0.0,
         "cycles": 1,
         "silhouettes": 0.0,
         "posture": 0.0,
@@ -210,7 +219,9 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "arm_colours": 0.0,
         "patience": 0.0,
         "odd_camera": False,
+        "recover": False,
         "surface": {"epsilon": 0.3, "tau": 0.06, "nearest": "euclidean"},
+        "forces": {"rho": "quadratic"},
         "gauss_newton": {"finalists": 1.0},
     },
 }

@@ -16,6 +16,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import ColourCode
 from shadowpuppet.camera.mask import Mask, half_size
 from shadowpuppet.geometry import Array
+from shadowpuppet.motion.prior.local_pca import Regions
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.multiview import arm_postures, body_postures, pose_search
 from shadowpuppet.tracking.multiview.arms_in_views import ArmsInViews, Counts
@@ -29,7 +30,7 @@ from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.watch.odd_camera import adapted, odd_one, suspects
 from shadowpuppet.tracking.particle_filter import Particles, Weigh, better_of, evaluate
 from shadowpuppet.tracking.recovery import OVERLAP_DROP, settle, track_or_recover
-from shadowpuppet.tracking.resampling import Scheme, make_scheme, normalise, with_best
+from shadowpuppet.tracking.resampling import SCHEMES, Indices, Scheme, normalise, with_best
 from shadowpuppet.tracking.silhouette_cost import Cost
 from shadowpuppet.tracking.status import status_of
 from shadowpuppet.tracking.unexplained import Unexplained, look_beside
@@ -69,6 +70,8 @@ class MultiviewState(NamedTuple):
     """Overlap in each camera's picture as it has been (C,), NaN without a silhouette so far; empty at the beginning."""
     colours: Counts = ()
     """The colours that have been seen on the arms and elsewhere, by camera."""
+    regions: Regions | None = None
+    """The motion prior's region drawn for each particle (N,); None where it is the one nearest to the pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,23 +179,26 @@ class MultiviewTracker:
         """The filter's loop body (V-A), `cycles` times; the steps are numbered as in the paper."""
         s, pose = self.settings, state.pose
         weigh, refine = self.weigh(observation), self.refine(observation, state.pose)
-        # Step 1: the last frame's particles (s, x, w). The state s is the region of the motion prior in which the refined pose x lies:
-        # `proposals` finds it. The paper keeps the region drawn before refinement (docs/method.md).
-        particles = state.particles
+        # Step 1: the last frame's particles (s, x, w). The state s is the region of the motion prior drawn for x before refinement, as in
+        # the paper, or (`region` = "nearest") the one in which the refined x lies: `proposals` finds it, and `regions` is None.
+        particles, regions = state.particles, state.regions
         for cycle in range(s.cycles or 1):
             # Step 2, selection: draw particles by their weights.
-            selected = particles.poses[self.resample(rng, particles.log_weights, self.number)]
+            chosen = self.resample(rng, particles.log_weights, self.number)
+            selected = particles.poses[chosen]
             # Step 3, sampling: draw each particle's next state and pose (eqs. 24-28).
             velocity = state.velocity if cycle == 0 else np.zeros_like(pose)  # the motion of a frame counts once
-            poses = self.proposals(rng, selected, pose, velocity, observation.mismatch, s.cooling**cycle)
+            poses, regions = self.proposals(rng, selected, pose, velocity, observation.mismatch, s.cooling**cycle,
+                                            None if regions is None else regions[chosen])
             # Step 4, refinement: move each pose by forces and moments (eqs. 32-41).
-            poses, refined = (poses, poses) if refine is None else refine(poses)
+            kept, refined = (slice(None), poses) if refine is None else refine(poses)
+            poses, regions = poses[kept], None if regions is None else regions[kept]
             # Step 5, weighting (eqs. 29-31); the estimate is the particle of greatest weight.
             particles = evaluate(refined, weigh)
             if s.local and s.method == "hybrid":  # not in the paper
                 particles = self.local_search(rng, better_of(particles, evaluate(poses, weigh)), weigh, self.number)
             pose = particles.best if s.estimate == "best" else normalise(particles.log_weights) @ particles.poses
-        return self.judge(pose, pose - state.pose, particles, observation, weigh)
+        return self.judge(pose, pose - state.pose, particles, observation, weigh)._replace(regions=regions)
 
     def search(self, rng: np.random.Generator, observation: MultiviewObservation, facing: float | None = None) -> MultiviewState:
         """A state from this frame alone: the best of many poses in all directions, or about `facing` (rad), refined."""
@@ -241,7 +247,7 @@ class MultiviewTracker:
         if s.method == "particle_filter":
             return None
         if s.refinement == "forces" or s.method == "image_force":
-            return lambda poses: (poses, self.refiner.forces(poses, observation.full, s.forces))  # eqs. 32-41, on all points
+            return lambda poses: (slice(None), self.refiner.forces(poses, observation.full, s.forces))  # eqs. 32-41, on all points
         return self._gauss_newton(observation, last)
 
     def _gauss_newton(self, observation: MultiviewObservation, last: Array) -> Refine:
@@ -254,11 +260,11 @@ class MultiviewTracker:
         share = g.finalists if len(self.cameras) > FEW_CAMERAS else 1.0
         number = max(FEWEST_FINALISTS, round(share * self.number))
 
-        def refine(poses: Array) -> tuple[Array, Array]:
+        def refine(poses: Array) -> tuple[Indices, Array]:
             rough, costs = self.refiner.descend(poses, coarse, centre, pull, g.damping)
             # where all go on they keep their order: what is drawn at random later goes by it
             best = costs.argsort(kind="stable")[:number] if number < len(poses) else np.arange(len(poses))
-            return poses[best], self.refiner.descend(rough[best], fine, centre, pull, g.damping)[0]
+            return best, self.refiner.descend(rough[best], fine, centre, pull, g.damping)[0]
 
         return refine
 
@@ -319,4 +325,5 @@ class MultiviewTracker:
     @cached_property
     def resample(self) -> Scheme:
         """The resampling scheme of step 2."""
-        return make_scheme(self.settings.resampling, 0.0) if self.scheme is None else with_best(self.scheme)
+        scheme = SCHEMES[self.settings.resampling] if self.scheme is None else self.scheme
+        return with_best(scheme) if self.settings.select_best else scheme

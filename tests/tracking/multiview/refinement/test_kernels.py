@@ -38,8 +38,8 @@ def test_costs_are_those_of_the_plain_version(seen, epsilon, choice, rng):
     np.testing.assert_allclose(Refiner(body, surface).costs(poses, make_cloud(*cloud)), plain, rtol=2e-4)
 
 
-@pytest.mark.parametrize("chosen", [{}, {"modulated": False}, {"robust": False}, {"hierarchical": False},
-                                    {"modulated": False, "robust": False, "hierarchical": False}, {"translation": 0.5, "rotation": 0.9}])
+@pytest.mark.parametrize("chosen", [{}, {"modulated": False}, {"rho": "none"}, {"rho": "quadratic"}, {"hierarchical": False},
+                                    {"modulated": False, "rho": "none", "hierarchical": False}, {"translation": 0.5, "rotation": 0.9}])
 @pytest.mark.parametrize("choice", ["euclidean", "modulated"])
 def test_forces_move_a_pose_as_in_the_plain_version(seen, choice, chosen):
     body, pose, *cloud = seen

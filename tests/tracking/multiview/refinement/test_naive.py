@@ -163,7 +163,7 @@ def test_forces_push_as_the_paper_says(body, rng):
     there = points + np.array([3.0, 0, 0])
     far = naive.move_by_forces(body, pose, there, normals, weights, SURFACE, ForceSettings(modulated=False))
     assert 0 < far[0] <= SURFACE.tau + 1e-9  # bounded
-    free = naive.move_by_forces(body, pose, there, normals, weights, SURFACE, ForceSettings(modulated=False, robust=False))
+    free = naive.move_by_forces(body, pose, there, normals, weights, SURFACE, ForceSettings(modulated=False, rho="none"))
     assert free[0] == 0.5  # a step is never longer
 
 

@@ -168,7 +168,7 @@ def test_room_that_is_used_again_remembers_nothing(seen, rng):
 
     first = answers()
     of.gauss_newton(pose[None] + 0.1, ((other, 2, 0.05),), pose, held)
-    of.forces(pose[None] - 0.1, other, ForceSettings(iterations=2, robust=False))
+    of.forces(pose[None] - 0.1, other, ForceSettings(iterations=2, rho="none"))
     for before, after in zip(first, answers()):
         np.testing.assert_array_equal(before, after)
 
@@ -242,7 +242,7 @@ def test_gauss_newton_finds_the_pose_from_near(name, rng):
     assert (actor.apart(of, found, pose) < actor.apart(of, starts, pose)).all()  # one of them ends in a minimum of its own
 
 
-@pytest.mark.parametrize("chosen", [{}, {"modulated": False}, {"robust": False}], ids=str)
+@pytest.mark.parametrize("chosen", [{}, {"modulated": False}, {"rho": "none"}, {"rho": "quadratic"}], ids=str)
 @pytest.mark.parametrize("name", WHOLE)
 def test_forces_find_the_pose_from_near(name, chosen, rng):
     of, pose, cloud, starts = beside(name, rng)
@@ -275,11 +275,17 @@ def test_forces_are_bounded_and_go_by_the_normals_only_if_wanted():
     def rise(**chosen) -> float:
         return of.forces(np.zeros((1, 1)), cloud, ForceSettings(iterations=1, fine_tau=0.08, **chosen))[0, 0]
 
-    assert rise(robust=False, modulated=False) == pytest.approx(0.2, abs=1e-4)
-    assert rise(robust=False) == pytest.approx(0.1, abs=1e-4)  # those that look down do not pull
+    assert rise(rho="none", modulated=False) == pytest.approx(0.2, abs=1e-4)
+    assert rise(rho="none") == pytest.approx(0.1, abs=1e-4)  # those that look down do not pull
     assert rise(modulated=False) == pytest.approx(0.08, abs=1e-4)
     assert rise() == pytest.approx(0.04, abs=1e-4)
     assert rise(translation=0.5) == pytest.approx(0.02, abs=1e-4)
+    assert rise(modulated=False, rho="quadratic") == pytest.approx(0.08, abs=1e-4)  # of a distance of 0.2 m, over the bound
+
+    points[:, 2] = 0.1 + 0.04
+    cloud = make_cloud(points, normals, np.ones(16))
+    assert rise(modulated=False) == pytest.approx(0.04, abs=1e-4)
+    assert rise(modulated=False, rho="quadratic") == pytest.approx(0.04**2 / 0.08, abs=1e-4)
 
 
 @pytest.mark.parametrize("name", WHOLE)

@@ -9,19 +9,22 @@ from shadowpuppet.jit import device, kernel, reduction_kernel
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, closest_on_part, closest_point, nearest, place_parts
 from shadowpuppet.tracking.multiview.refinement.part_sums import add_descendants, is_first_of_part, sum_by_joint
 
+UNBOUNDED, LINEAR, QUADRATIC = 0, 1, 2
+"""rho of eq. 32; the quadratic one is divided by tau, so that all have the same bound."""
+
 
 @kernel
-def push(poses, bounded, modulated, hierarchical, gains, balance, iterations, chain, limbs, rows, spheres, origin, numbers, which, room,
+def push(poses, rho, modulated, hierarchical, gains, balance, iterations, chain, limbs, rows, spheres, origin, numbers, which, room,
          vectors):  # pragma: no cover
     """Move poses (N, D), in place, by forces and moments until these balance, in at most `iterations` steps, as `Refiner.forces`
-    describes. Without `hierarchical` only the forces on parts fixed to a joint move it; the root is translated by the forces on all parts
-    in either case."""
+    describes. `rho` is one of the numbers above. Without `hierarchical` only the forces on parts fixed to a joint move it; the root is
+    translated by the forces on all parts in either case."""
     T, screws, work, sums, force = room[1], room[2], room[3], room[6], vectors[1, :4]
     for n in range(poses.shape[0]):
         for _ in range(iterations):
             place_one(poses[n], chain, T, screws, work)
             # eqs. 32, 33, 36, 37 of each joint's own parts
-            _sum_forces(bounded, modulated, T, limbs, rows, spheres, origin, numbers, which, room)
+            _sum_forces(rho, modulated, T, limbs, rows, spheres, origin, numbers, which, room)
             force[:] = 0
             for j in range(sums.shape[0]):  # eq. 38: the forces on all parts translate the root
                 for k in range(4):
@@ -34,7 +37,7 @@ def push(poses, bounded, modulated, hierarchical, gains, balance, iterations, ch
 
 
 @kernel
-def _sum_forces(bounded, modulated, T, limbs, rows, spheres, origin, numbers, which, room):  # pragma: no cover
+def _sum_forces(rho, modulated, T, limbs, rows, spheres, origin, numbers, which, room):  # pragma: no cover
     """Fill the joints' sums of forces and moments, under transforms T (J, 3, 4)."""
     parts, _, _, _, out, lanes, sums = room
     joints, rotations, starts = limbs
@@ -49,12 +52,12 @@ def _sum_forces(bounded, modulated, T, limbs, rows, spheres, origin, numbers, wh
                 number = near[LANES + i]
                 s = np.int64(number)
                 closest_on_part(parts[s], points, out)
-                _add_forces(parts[s], number, points, near, tau, bounded, modulated, out, lanes[s])
+                _add_forces(parts[s], number, points, near, tau, rho, modulated, out, lanes[s])
     sum_by_joint(joints, lanes, sums)
 
 
 @reduction_kernel
-def _add_forces(q, number, rows, near, tau, bounded, modulated, out, lanes):  # pragma: no cover
+def _add_forces(q, number, rows, near, tau, rho, modulated, out, lanes):  # pragma: no cover
     """Add the forces on part `number` to `lanes` (SUMS LANES,): moments about the cloud's origin (3) and forces (3); and, for the model's
     points p' on which they act, the weight, the first moments (3) and the second moments (6)."""
     nil = np.float32(0)
@@ -63,7 +66,8 @@ def _add_forces(q, number, rows, near, tau, bounded, modulated, out, lanes):  # 
         dx, dy, dz = rows[i] - x, rows[LANES + i] - y, rows[2 * LANES + i] - z
         distance = np.sqrt(dx * dx + dy * dy + dz * dz) + np.float32(1e-9)
         size = max(out[LANES + i], nil) * distance if modulated else distance  # m_F |pp'|, m_F = cos(n, n')
-        size = min(size, tau) if bounded else size  # the robust function rho
+        size = size * size / tau if rho == QUADRATIC else size
+        size = size if rho == UNBOUNDED else min(size, tau)  # the robust function rho
         w = rows[6 * LANES + i] if near[LANES + i] == number else nil
         push = w * size / distance
         fx, fy, fz = push * dx, push * dy, push * dz  # eq. 32, from p' to p

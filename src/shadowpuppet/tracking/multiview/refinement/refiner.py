@@ -17,14 +17,17 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, normal_weights, part_constants
-from shadowpuppet.tracking.multiview.refinement.forces import push
+from shadowpuppet.tracking.multiview.refinement.forces import LINEAR, QUADRATIC, UNBOUNDED, push
 from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, free_space, spheres_in
 from shadowpuppet.tracking.multiview.refinement.gauss_newton import descend
 from shadowpuppet.tracking.multiview.refinement.part_sums import SUMS, sum_costs
 from shadowpuppet.tracking.multiview.settings import ForceSettings, SurfaceSettings
+from shadowpuppet.tracking.resampling import Indices
 
-Refine = Callable[[Array], tuple[Array, Array]]
-"""Function from poses (N, D) to those of them (M, D) that are refined to the end, and these refined (M, D)."""
+Refine = Callable[[Array], tuple[Indices | slice, Array]]
+"""Function from poses (N, D) to the indices of the M that are refined to the end, and these refined (M, D)."""
+RHO = {"none": UNBOUNDED, "linear": LINEAR, "quadratic": QUADRATIC}
+"""The kernel's numbers of `ForceSettings.rho`."""
 
 
 class Pass(NamedTuple):
@@ -97,7 +100,7 @@ class Refiner:
         poses, s = self.body.skeleton.checked(poses).copy(), settings
         half = s.iterations // 2
         for tau, iterations in ((s.coarse_tau, half), (s.fine_tau, s.iterations - half)):
-            push(poses, s.robust, s.modulated, s.hierarchical, (s.translation, s.rotation), s.balance, iterations, self._chain,
+            push(poses, RHO[s.rho], s.modulated, s.hierarchical, (s.translation, s.rotation), s.balance, iterations, self._chain,
                  self._limbs, cloud.rows, cloud.spheres, cloud.origin, self._numbers(tau), self._which(cloud), self._room(),
                  self._system()[2])
         return poses
