@@ -16,7 +16,7 @@ from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Opening, Sample, t
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
-from shadowpuppet.pipeline.silhouettes import Classified, Silhouettes, learn_silhouettes
+from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.silhouette.added import AddedParts, BesideBody, always_alike, find_added, find_nobody
 from shadowpuppet.silhouette.correction.condition import FilmCondition, film_condition
@@ -91,9 +91,9 @@ def of_several(film: FilmSurvey) -> FilmSurvey:
 
 
 def _made(sample: Sample, silhouettes: Silhouettes) -> tuple[Silhouettes, list[list[Mask]]]:
-    """Silhouettes, which classify each of the sample's frames once, and their masks of its runs."""
-    if not silhouettes.classified:
-        silhouettes = replace(silhouettes, classified=Classified(sample.frames))
+    """Silhouettes, with the sample's frames classified, and their masks of its runs."""
+    if silhouettes.segmenter is not None and not silhouettes.classified:
+        silhouettes.classified.update((id(image), (image, silhouettes.segmenter.labelled(image))) for _, image, _ in sample.frames)
     return silhouettes, [[silhouettes(frame) for frame in run] for run in sample.runs]
 
 
