@@ -167,11 +167,13 @@ def quality_of(runs: Sequence[Sequence[Mask]], starts: Sequence[int], ready: boo
     def each(*names: str) -> dict[str, list[float]]:
         return {name: [getattr(part, name) for part in parts] for name in names}
 
+    def first(name: str) -> int | None:
+        return min((start + n for part, start in zip(parts, starts) if (n := getattr(part, name)) is not None), default=None)
+
     means = each("area_jumps", "specks", "speck_area", "holes", "hole_area") | {
         side: [part.border[side] for part in parts] for side in parts[0].border}  # fmt: skip
     mean = {name: float(np.average(values, weights=frames)) for name, values in means.items()}
     median = {name: float(np.median(values)) for name, values in each("area", "area_change", "flicker").items()}
-    first = {name: min((start + n for n, start in zip(values, starts) if n is not None), default=None)
-             for name, values in each("first_empty", "first_full").items()}  # fmt: skip
     return MaskQuality(frames=int(frames.sum()), border={side: mean.pop(side) for side in parts[0].border}, ready=ready,
-                       empty=sum(part.empty for part in parts), full=sum(part.full for part in parts), **mean, **median, **first)
+                       empty=sum(part.empty for part in parts), full=sum(part.full for part in parts),
+                       first_empty=first("first_empty"), first_full=first("first_full"), **mean, **median)
