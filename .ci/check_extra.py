@@ -42,11 +42,11 @@ def live(folder: Path) -> None:
 
     from shadowpuppet.body.models import average_sizes, make_body
     from shadowpuppet.live.stream.choice import open_outlets
-    from shadowpuppet.live.stream.outlet import Subject
+    from shadowpuppet.live.stream.outlet import StreamSubject
     from shadowpuppet.live.stream.settings import OutletSettings
 
     with open_outlets(OutletSettings(websocket="0")) as outlets:
-        outlets.begin(Subject(make_body("rounded", average_sizes("rounded", 1.75)), np.eye(4)))
+        outlets.begin(StreamSubject(make_body("rounded", average_sizes("rounded", 1.75)), np.eye(4)))
         with connect(outlets.where.rpartition(" ")[2]) as connection:
             assert json.loads(connection.recv(10))["type"] == "begin"
 

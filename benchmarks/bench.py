@@ -25,30 +25,32 @@ from shadowpuppet.cli.doctor import environment
 from shadowpuppet.cli.tables import pairs, show, table
 from shadowpuppet.threads import one_blas_thread
 
-# key of the time, name, factor to the unit, unit, and key of its ratio to the row above
+FACTORS = {"us": 1e6, "ms": 1e3}
+"""Units of time, a second."""
+# key of the time, name, unit, and key of its ratio to the row above
 MONO_ROWS = (
-    ("particle", "a particle of cardbox, pose to cost", 1e6, "us", ""),
-    ("opencv", "  OpenCV, its polygons ready-made", 1e6, "us", "mono.ratio_opencv_full"),
-    ("boxes", "  boxes instead of cardbox", 1e6, "us", "mono.ratio_boxes"),
-    ("arm", "a particle of an arm's stage", 1e6, "us", ""),
-    ("opencv_arm", "  OpenCV, its polygons ready-made", 1e6, "us", "mono.ratio_opencv_arm"),
-    ("step", "a frame of the filter at Table I", 1e3, "ms", ""),
-    ("naive_frame", "  plain NumPy and Python", 1e3, "ms", "mono.ratio_naive_frame"),
-    ("default", "a frame of the default filter", 1e3, "ms", ""),
-    ("silhouette", "a frame's silhouette, 640 x 480", 1e3, "ms", ""),
-    ("correct", "  of this, light and movement looked for", 1e3, "ms", "mono.ratio_correction"),
-    ("naive_correct", "  plain OpenCV and NumPy: one shift, one gain", 1e3, "ms", "mono.ratio_naive_correction"),
-    ("correct_moved", "  a nudged camera's frame shifted back", 1e3, "ms", "mono.ratio_correction_moved"),
-    ("correct_uneven", "  an uneven change of light undone", 1e3, "ms", "mono.ratio_correction_uneven"),
+    ("particle", "a particle of cardbox, pose to cost", "us", ""),
+    ("opencv", "  OpenCV, its polygons ready-made", "us", "mono.ratio_opencv_full"),
+    ("boxes", "  boxes instead of cardbox", "us", "mono.ratio_boxes"),
+    ("arm", "a particle of an arm's stage", "us", ""),
+    ("opencv_arm", "  OpenCV, its polygons ready-made", "us", "mono.ratio_opencv_arm"),
+    ("step", "a frame of the filter at Table I", "ms", ""),
+    ("naive_frame", "  plain NumPy and Python", "ms", "mono.ratio_naive_frame"),
+    ("default", "a frame of the default filter", "ms", ""),
+    ("silhouette", "a frame's silhouette, 640 x 480", "ms", ""),
+    ("correct", "  of this, light and movement looked for", "ms", "mono.ratio_correction"),
+    ("naive_correct", "  plain OpenCV and NumPy: one shift, one gain", "ms", "mono.ratio_naive_correction"),
+    ("correct_moved", "  a nudged camera's frame shifted back", "ms", "mono.ratio_correction_moved"),
+    ("correct_uneven", "  an uneven change of light undone", "ms", "mono.ratio_correction_uneven"),
 )
 MULTI_ROWS = (
-    ("hull", "silhouettes to surface points", 1e3, "ms", ""),
-    ("forces", "simulated forces, a particle and iteration", 1e6, "us", ""),
-    ("naive_forces", "  plain NumPy", 1e6, "us", "multi.ratio_naive"),
-    ("gauss_newton", "Gauss-Newton, a particle and iteration", 1e6, "us", ""),
-    ("naive_gauss_newton", "  plain NumPy", 1e6, "us", "multi.ratio_naive_gauss_newton"),
-    ("forces_frame", "a frame of ni2008, silhouettes to pose", 1e3, "ms", ""),
-    ("default_frame", "a frame of the default preset", 1e3, "ms", ""),
+    ("hull", "silhouettes to surface points", "ms", ""),
+    ("forces", "simulated forces, a particle and iteration", "us", ""),
+    ("naive_forces", "  plain NumPy", "us", "multi.ratio_naive"),
+    ("gauss_newton", "Gauss-Newton, a particle and iteration", "us", ""),
+    ("naive_gauss_newton", "  plain NumPy", "us", "multi.ratio_naive_gauss_newton"),
+    ("forces_frame", "a frame of ni2008, silhouettes to pose", "ms", ""),
+    ("default_frame", "a frame of the default preset", "ms", ""),
 )
 CHAIN = {"decode": "decoding", "segment": "segmentation", "track": "filter", "doubt": "doubt", "write": "writing"}
 
@@ -77,8 +79,8 @@ def run_bench(extent: Extent = FULL) -> dict[str, Any]:
 def tables(found: Mapping[str, Any]) -> Iterator[Any]:
     """The figures for the terminal."""
     for title, rows in (("one camera, 320 x 240", MONO_ROWS), ("seven cameras, 640 x 480", MULTI_ROWS)):
-        cells = ((name, *(f"{scale * found['raw'][key][which]:.4g}" for which in ("median", "least")), unit,
-                  f"{found[ratio]:.3g}" if ratio else "") for key, name, scale, unit, ratio in rows)  # fmt: skip
+        cells = ((name, *(f"{FACTORS[unit] * found['raw'][key][which]:.4g}" for which in ("median", "least")), unit,
+                  f"{found[ratio]:.3g}" if ratio else "") for key, name, unit, ratio in rows)  # fmt: skip
         yield table(f"time, {title}", ("", "median", "least", "", "times"), cells, right=(1, 2, 4))
     here = found["environment"]
     stages = ", ".join(f"{name} {found[f'mono.{stage}_ms']:.1f}" for stage, name in CHAIN.items())

@@ -11,7 +11,7 @@ import numpy as np
 
 from shadowpuppet.body.upper_body import WRIST_SHARE
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.colour_codes import Codes, colour_codes
+from shadowpuppet.camera.colour_codes import ColourCode, colour_codes
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
@@ -43,7 +43,7 @@ class Case:
     times: Array
     masks: list[Mask]
     """For the tracker."""
-    codes: list[Codes | None]
+    codes: list[ColourCode | None]
     """Their colours."""
     truth: JointTable
 
@@ -112,7 +112,7 @@ class Case:
                       "aligned": aligned["aligned_mean_mm"], "jitter": jitter}
 
 
-def _pass(tracker: MonocularTracker, rng: np.random.Generator, masks: list[Mask], codes: list[Codes | None],
+def _pass(tracker: MonocularTracker, rng: np.random.Generator, masks: list[Mask], codes: list[ColourCode | None],
           colours: ColourCounts | None = None) -> tuple[Array, Array, float, ColourCounts | None]:
     """Poses (T, D) and costs (T,) of masks tracked in their order, the processor time (s) after the first, and the colours of the person's
     arms; `colours`: what is known of them before."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import io
 import re
 import zipfile
@@ -28,6 +29,9 @@ def mutated(rng: np.random.Generator, content: bytes, other: bytes) -> bytes:
     """A file's content after one or more changes; `other`: another file's content, parts of which may be inserted."""
     if content[:2] == b"PK" and rng.random() < 0.9:
         return in_archive(rng, content)
+    if content.startswith(codecs.BOM_UTF16_LE) and rng.random() < 0.9:
+        text = [each.decode("utf-16", "ignore").encode("utf-8", "ignore") for each in (content, other)]
+        return mutated(rng, *text).decode("utf-8", "ignore").encode("utf-16")
     is_text = b"\0" not in content[:2000]
     for _ in range(1 + int(rng.geometric(0.6))):
         change = (TEXT if is_text and rng.random() < 0.8 else BINARY)[rng.integers(len(TEXT if is_text else BINARY)) % len(BINARY)]

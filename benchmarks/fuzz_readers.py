@@ -40,7 +40,7 @@ SECONDS, MEMORY = 10, 500_000_000
 WAITING = 10 * SECONDS
 """Time by the clock that one input may take: on a crowded machine a reader waits for its turn."""
 AT_ONCE, FEW = 200, 25
-"""Inputs of a reader before it is the next one's turn; in a short run."""
+"""Most inputs of a reader before it is the next one's turn; in a short run."""
 IN_MEMORY = Path("/dev/shm")
 """Files written here are on no disk, on which writing an input takes longer than reading it."""
 AT = "number"
@@ -82,9 +82,10 @@ def fuzz(args: argparse.Namespace, folder: Path) -> tuple[dict[str, int], int]:
     fuzz_seeds.write(folder / "seeds")
     tried, findings, child = dict.fromkeys(names, 0), 0, start(folder, args.seed)
     end = time.monotonic() + args.seconds
+    at_once = min(AT_ONCE if args.seconds > 60 else FEW, -(-args.inputs // len(names)))
     while sum(tried.values()) < args.inputs and time.monotonic() < end:
         for name in names:
-            for report in ask(child, name, folder, tried[name], AT_ONCE if args.seconds > 60 else FEW):
+            for report in ask(child, name, folder, tried[name], at_once):
                 tried[name] = report.number + 1
                 if report.cause:
                     findings += 1

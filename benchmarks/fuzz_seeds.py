@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "support"))
@@ -14,6 +16,8 @@ import acclaim
 import biovision
 import calibrations
 import motions
+import motive
+import png
 import runs
 import vicon
 
@@ -21,9 +25,11 @@ from shadowpuppet.body.models import MODELS, average_sizes
 from shadowpuppet.calibration.boards.board import board_from, board_text, read_board
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.io.calibration.calibration_files import examine_calibration, write_calibration
+from shadowpuppet.io.calibration.formats import is_calibration
 from shadowpuppet.io.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from shadowpuppet.io.export import export_run
 from shadowpuppet.io.intervals import read_intervals
+from shadowpuppet.io.masks.ready_masks import mask_kind, open_masks
 from shadowpuppet.io.motion.amc import read_mocap
 from shadowpuppet.io.motion.joint_names import read_names
 from shadowpuppet.io.motion.motion_files import read_motion, read_truth
@@ -46,10 +52,12 @@ READERS: dict[str, Callable[[Path], object]] = {
     "calibration": examine_calibration,
     "pair": lambda path: examine_calibration(path.parent),
     "colmap": lambda path: examine_calibration(path.parent),
+    "found": is_calibration,
     "board": read_board,
     "person": read_person,
     "prior": read_prior,
     "recording": lambda path: read_recording(path.parent),
+    "project": lambda path: read_recording(path.parent),
     "run": lambda path: read_run(path.parent),
     "tables": lambda path: read_run(path.parent),
     "intervals": read_intervals,
@@ -66,6 +74,8 @@ READERS: dict[str, Callable[[Path], object]] = {
     "script": lambda path: read_script(path, "made"),
     "checkpoint": lambda path: read_checkpoint(path.parent, [MotionFrame]),
     "image": read_image,
+    "mask": lambda path: [list(open_masks(path, mask_kind(path, label))) for label in (None, 1)],
+    "times": lambda path: open_frames(path.parent),
     "film": lambda path: next(iter(open_frames(path)), None),
 }
 """By name; each reads one of the files in the folder of that name."""
@@ -94,7 +104,8 @@ cam0 = "film"
 
 def of(name: str, folder: Path) -> list[Path]:
     """The files of a reader, of those that `write` wrote into a folder."""
-    whole = {"run": ("*",), "tables": ("*.csv", "run.toml"), "recording": ("recording.toml",), "checkpoint": ("*.npz",)}
+    whole = {"tables": ("*.csv", "run.toml"), "recording": ("recording.toml",), "project": ("*.toml",), "checkpoint": ("*.npz",),
+             "times": ("*.txt",)}
     return sorted(path for pattern in whole.get(name, ("*",)) for path in (folder / name).glob(pattern) if path.is_file())
 
 
@@ -128,7 +139,22 @@ def write(folder: Path) -> None:
     write_checkpoint(folder / "checkpoint", Checkpoint(1, (frame, {"a": None, "b": True}, np.float64(2))))
     for ending in ("png", "jpg", "bmp", "tif", "webp"):
         write_image(folder / "image" / f"a.{ending}", rng.integers(0, 255, (12, 16, 3), np.uint8))
+    _masks(folder / "mask")
+    _project(folder / "project", made)
+    _pictures(folder / "times", made[0].size)
+    (folder / "times" / "timestamps.txt").write_text("0\n0.04\n0.08\n")
     _films(folder / "film", rng)
+
+
+def _masks(folder: Path) -> None:
+    """Masks of every kind: grey, with alpha, labels with a palette and of 16 bit."""
+    mask = np.zeros((12, 16), np.uint8)
+    mask[3:9, 5:10] = 1
+    write_image(folder / "grey.png", 255 * mask)
+    (folder / "palette.png").write_bytes(png.palette_png(mask, (0, 0, 0, 128, 0, 0)))
+    (folder / "clear.png").write_bytes(png.palette_png(mask, (0, 0, 0, 128, 0, 0), (0, 255)))
+    for name, image in (("alpha", np.dstack([mask] * 3 + [255 * mask])), ("deep", 7 * mask.astype(np.uint16))):
+        (folder / f"{name}.png").write_bytes(cv2.imencode(".png", image)[1].tobytes())
 
 
 def _films(folder: Path, rng: np.random.Generator) -> None:
@@ -147,16 +173,47 @@ def _calibrations(folder: Path, made: list[Camera]) -> None:
         file = next(path.iterdir()) if path.is_dir() and name not in ("easy", "colmap") else path
         if file.is_file():
             (folder / "calibration" / file.name).write_bytes(file.read_bytes())
+    fish = calibrations.cameras(2, calibrations.LENS[:4])
+    texts = {"fisheye.yaml": calibrations.kalibr(made, distortion="equidistant"), "types.yml": calibrations.mc_calib(fish, 1),
+             "plain.json": json.dumps({camera.name: camera_table(camera) for camera in made}),
+             "turned.toml": calibrations.caliscope(made).replace("rotation_count = 0", "rotation_count = 1"),
+             "matrix.toml": calibrations.caliscope(made, "matrix"), "radial.xcp": calibrations.vicon(made, radial=1)}
+    for name, text in texts.items():
+        (folder / "calibration" / name).write_text(text)
+    (folder / "calibration" / "utf16.toml").write_text(calibrations.toml(made), "utf-16")
+    for path in (folder / "calibration").iterdir():
+        (folder / "found" / path.name).write_bytes(path.read_bytes())
     (folder / "calibration" / "rough.toml").write_text("[a]\nat = [3, 0, 1.5]\ntoward = [0, 0, 1]\nfov = 65\nsize = [640, 480]\n")
     for name in ("intri.yml", "extri.yml"):
         (folder / "pair" / name).write_bytes((folder / "easy" / name).read_bytes())
     (folder / "board" / "board.toml").write_text(board_text(board_from("charuco 7x5", 0.04)))
     place = folder / "recording"
     write_calibration(place / "calibration.toml", made)
-    (place / "film").mkdir()
-    for n in range(3):
-        write_image(place / "film" / f"{n}.png", np.full((made[0].size[1], made[0].size[0]), 9 * n, np.uint8))
+    _pictures(place / "film", made[0].size)
     (place / "recording.toml").write_text(RECORDING.replace("cam0", made[0].name))
+
+
+def camera_table(camera: Camera) -> dict[str, object]:
+    T = camera.T_camera_world
+    return {"K": camera.matrix.tolist(), "rvec": calibrations.rotation(camera).as_rotvec().tolist(), "t": T[:3, 3].tolist(),
+            "D": camera.distortion[:4].tolist(), "size": list(camera.size), "fisheye": True, "units": "m"}  # fmt: skip
+
+
+def _pictures(folder: Path, size: tuple[int, int]) -> None:
+    folder.mkdir(exist_ok=True)
+    for n in range(3):
+        write_image(folder / f"{n}.png", np.full(size[::-1], 9 * n, np.uint8))
+
+
+def _project(folder: Path, made: list[Camera]) -> None:
+    """Pose2Sim's: settings, and a calibration that is not in the recording's folder."""
+    (folder / "Config.toml").write_text("[project]\nparticipant_height = 1.78\nframe_rate = 25\nframe_range = [0, 2]\n")
+    for name in ("calibration", "videos"):
+        (folder / name).mkdir()
+    (folder / "calibration" / "Calib.toml").write_text(calibrations.toml(made))
+    for camera in made:
+        with write_frames(folder / "videos" / f"{camera.name}.mp4", 25.0) as film:
+            film.write(np.zeros((*camera.size[::-1], 3), np.uint8))
 
 
 def _motions(folder: Path, run: Path, rng: np.random.Generator) -> None:
@@ -167,7 +224,12 @@ def _motions(folder: Path, run: Path, rng: np.random.Generator) -> None:
             (folder / "joints" / path.name).write_bytes(path.read_bytes())
             (folder / "truth" / path.name).write_bytes(path.read_bytes())
     (folder / "motion" / "other.bvh").write_text(biovision.person())
-    labels, places = ("LSHO", "RSHO", "LELB", "C7"), rng.random((5, 4, 3)) * 1000
+    for path in [path for path in (folder / "motion").iterdir() if path.suffix in (".csv", ".trc", ".bvh")]:
+        (folder / "motion" / f"utf16{path.name}").write_text(path.read_text(), "utf-16")
+    for name, kind in (("bones", "Bone"), ("markers", "Marker")):
+        (folder / "motion" / f"{name}.csv").write_text(motive.export(kind))
+        (folder / "joints" / f"{name}.csv").write_text(motive.export(kind))
+    labels, places = ("LFEP", "LTIO", "LCLO", "C7"), rng.random((5, 4, 3)) * 1000
     for processor in (vicon.INTEL, vicon.DEC, vicon.MIPS):
         for scale in (-1.0, 0.1):
             (folder / "motion" / f"{processor}{scale}.c3d").write_bytes(vicon.c3d(labels, places, processor=processor, scale=scale))

@@ -13,7 +13,7 @@ import numpy as np
 import smallest
 
 from shadowpuppet.body.skeleton import SIDES
-from shadowpuppet.evaluation.movement.gait_figures import Figure, gait_figures
+from shadowpuppet.evaluation.movement.gait_figures import GaitParameter, gait_figures
 from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.motion.contact.contact import Contacts, contacts_of
 from shadowpuppet.motion.contact.steps import find_gait
@@ -21,7 +21,7 @@ from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.synchronization import at_times
 
 
-def figures(table: JointTable, contacts: Contacts) -> list[Figure]:
+def figures(table: JointTable, contacts: Contacts) -> list[GaitParameter]:
     """Figures of a gait with ankles in place of heels."""
     ankles = [f"{side}_ankle" for side in SIDES]
     positions = table.select(["pelvis", *ankles]).positions

@@ -29,10 +29,10 @@ from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.motion.table import JointTable
 from shadowpuppet.io.recording import Recording, read_recording
-from shadowpuppet.live.display.view import Display, View
+from shadowpuppet.live.display.view import Display, SessionState
 from shadowpuppet.live.run import run_live
 from shadowpuppet.live.settings import LiveSettings
-from shadowpuppet.live.stream.outlet import Outlet, Outlets, StreamFrame, Subject
+from shadowpuppet.live.stream.outlet import Outlet, Outlets, StreamFrame, StreamSubject
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video import Size, open_frames
 
@@ -151,7 +151,7 @@ class Receiver(Outlet):
         self.frames: list[tuple[float, StreamFrame]] = []
         self.names: tuple[str, ...] = ()
 
-    def begin(self, subject: Subject) -> None:
+    def begin(self, subject: StreamSubject) -> None:
         """Note the joints' names."""
         self.names = subject.names
 
@@ -168,7 +168,7 @@ class Timer(Display):
         self.stalled_from, self.seconds, self.end, self.said = stalled_from, seconds, np.inf, set[str]()
         self.limit = time.monotonic() + 90
 
-    def show(self, view: View) -> None:
+    def show(self, view: SessionState) -> None:
         """Look for the first pose."""
         if view.phase == "tracking" and not np.isfinite(self.end):
             self.end = time.monotonic() + self.seconds

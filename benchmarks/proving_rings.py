@@ -44,7 +44,7 @@ from shadowpuppet.pipeline.person_rig import MultiviewSubject, fit_multiview
 from shadowpuppet.pipeline.rig import open_rig, read_frames
 from shadowpuppet.pipeline.silhouette_cache import MaskStore
 from shadowpuppet.synthetic import Spec, proving_rings
-from shadowpuppet.synthetic.person.mannequin import Kind, Mannequin
+from shadowpuppet.synthetic.person.mannequin import Mannequin, PersonKind
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 
 ROWS: dict[str, dict[str, Any]] = {
@@ -158,7 +158,7 @@ def with_cameras(spec: Spec, n: int, cameras: int) -> Spec:
     assert spec.ring is not None
     seed = 1000 * cameras + n
     rng, name = np.random.default_rng(seed), spec.name
-    kind: Kind = "child" if name in CHILDREN else "woman" if name in WOMEN else "man"
+    kind: PersonKind = "child" if name in CHILDREN else "woman" if name in WOMEN else "man"
     body = Mannequin.draw(np.random.default_rng(seed), kind, age=8 if kind == "child" else None)
     ring = replace(spec.ring, count=cameras, radius=float(rng.uniform(3.4, 4.4)), height=float(rng.uniform(1.3, 2.3)),
                    start_deg=float(rng.uniform(0, 90)), jitter=0.6, fov_deg=50, size=(480, 360), seed=seed)  # fmt: skip

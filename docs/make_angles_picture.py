@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from shadowpuppet.body.bones import BONES
 from shadowpuppet.body.conventions import BEND, Convention, conventions
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.skeleton import AXES
+from shadowpuppet.body.skeleton import AXES, BONES
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.angle_conventions import HEIGHT
 

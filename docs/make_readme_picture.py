@@ -15,9 +15,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from shadowpuppet.body.bones import BONES
 from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import draw_model, draw_skeleton, write_text
 from shadowpuppet.camera.rasterize import Picture

@@ -19,7 +19,7 @@ from playwright.sync_api import Browser, sync_playwright
 
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.viewer.scene.open_any import open_scene
-from shadowpuppet.viewer.scene.scene import Scene
+from shadowpuppet.viewer.scene.scene import Stage
 from shadowpuppet.viewer.web.serve import serving
 
 ASSETS = Path(__file__).parent / "assets"
@@ -34,7 +34,7 @@ SETTLED = 6000
 """Milliseconds until everything is drawn."""
 
 
-def photographed(browser: Browser, scene: Scene, name: str, second: float, then: str = "", size: tuple[int, int] = SIZE,
+def photographed(browser: Browser, scene: Stage, name: str, second: float, then: str = "", size: tuple[int, int] = SIZE,
                  scheme: Literal["light", "dark"] = "light") -> None:
     """A picture of the page at a second of the scene, after some script."""
     with serving(scene, port=0) as address:

@@ -8,10 +8,10 @@ import numpy as np
 
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec, Viewpoint
 from shadowpuppet.synthetic.person.clothes import Clothes
-from shadowpuppet.synthetic.person.dressed import dressed
-from shadowpuppet.synthetic.person.kinematics import Figure
+from shadowpuppet.synthetic.person.kinematics import PosedBody
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
+from shadowpuppet.synthetic.scene_renderer import dressed
 from shadowpuppet.video import write_image
 
 TARGET = Path(__file__).parent / "assets" / "motions.png"
@@ -36,7 +36,7 @@ def row(n: int, kind, gesture: Gesture, begin: float, step: float) -> np.ndarray
     renderer = PersonRenderer(view.camera(), dressed(body, clothes), clothes, LAMPS)
     tiles = []
     for index in np.rint((begin + step * np.arange(COUNT)) * 100).astype(int):
-        one, there = Figure(*(part[index : index + 1] for part in figure)), figure.joints[index, 0] * [1, 1, 0]
+        one, there = PosedBody(*(part[index : index + 1] for part in figure)), figure.joints[index, 0] * [1, 1, 0]
         shot = renderer.draw(one._replace(origin=one.origin - there, joints=one.joints - there), 0)
         tiles.append(shot.picture + (1 - shot.alpha[..., None]) * 0.93)
     return np.concatenate(tiles, 1)

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import runs
 
-from shadowpuppet.body.bones import BONES
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.limbs import DOUBTFUL, limb_of
 from shadowpuppet.motion.mesh import LEFT_COLOUR, MIDDLE_COLOUR, RIGHT_COLOUR

@@ -20,7 +20,9 @@ from shadowpuppet.geometry import (
     rigid,
     rotation_about,
     rotation_from_vector,
+    shortest_rotation,
     transform,
+    unit,
     vector_from_rotation,
 )
 
@@ -53,6 +55,15 @@ def test_turning_is_by_the_right_hand():
 def test_rotations_about_one_axis_add(a, b):
     axis = np.array([2.0, -3.0, 6.0]) / 7
     np.testing.assert_allclose(rotation_about(axis, a) @ rotation_about(axis, b), rotation_about(axis, a + b), atol=1e-12)
+
+
+def test_the_shortest_rotation_turns_one_direction_to_the_other_and_keeps_their_common_normal(rng):
+    start, end = unit(rng.standard_normal((2, 50, 3)))
+    R, normal = shortest_rotation(start, end, 1e-9), unit(np.cross(start, end))
+    np.testing.assert_allclose((R @ start[..., None])[..., 0], end, atol=1e-9)
+    np.testing.assert_allclose((R @ normal[..., None])[..., 0], normal, atol=1e-9)
+    np.testing.assert_allclose(shortest_rotation(start[0], end[:2], 1e-9)[0], R[0], atol=1e-12)
+    np.testing.assert_array_equal(shortest_rotation(start, start, 1e-9), np.broadcast_to(np.eye(3), (50, 3, 3)))
 
 
 def test_rotations_are_batched_over_angles(rng):

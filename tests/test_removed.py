@@ -34,6 +34,13 @@ def test_a_removed_flag_or_value_names_its_replacement(shell, flags):
     assert err == f"error: {flags[0].partition('=')[0]}: {sentence}\n"
 
 
+@pytest.mark.parametrize(("command", "flag"), [("synthesize", ("--like", "humaneva_walking")), ("evaluate", ("--joints", "humaneva"))])
+def test_what_served_humaneva_alone_names_its_replacement(shell, command, flag):
+    code, out, err = shell(command, "here", *flag)
+    assert (code, out) == (2, "")
+    assert err == f"error: {flag[0]}: {SETTINGS[f'{flag[0][2:]} = {flag[1]}']}\n"
+
+
 @pytest.mark.parametrize(("table", "name"), [({"maintain": True}, "maintain"), ({"method": "knn"}, "method")])
 def test_a_removed_setting_in_a_file_names_its_replacement(table, name):
     with pytest.raises(SettingsError, match=rf"^old\.toml: silhouette\.{name}: .*(shadowpuppet masks|mog2)"):

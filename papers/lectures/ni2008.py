@@ -22,13 +22,13 @@ from papers.common.plotting import COLOURS, label, new_figure, save_picture
 from papers.ni2008.inputs import Case, Source
 from papers.ni2008.models import limbs_of
 from papers.ni2008.reading import drawn
-from shadowpuppet.body.bones import BONES
+from papers.ni2008.recordings import humaneva
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.training import modelled
 from shadowpuppet.motion.prior.vqpca import fit_prior
-from shadowpuppet.synthetic import humaneva
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
 from shadowpuppet.tracking.multiview.settings import ForceSettings, make_multiview_settings

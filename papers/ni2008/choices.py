@@ -16,8 +16,9 @@ import numpy as np
 from papers.common.experiment import Outcome, Request, Table
 from papers.ni2008.inputs import SHORT, Case, Source, load
 from papers.ni2008.measures import of_runs
+from papers.ni2008.recordings import humaneva
 from papers.ni2008.tracks import FORCES_FROM_TRUTH, Track, Way, annealed, of, particle_filter, tracks
-from shadowpuppet.synthetic import Mannequin, humaneva
+from shadowpuppet.synthetic import Mannequin
 from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 

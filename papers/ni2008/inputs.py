@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from papers.common.experiment import Request
 from papers.common.sources import digest
+from papers.ni2008.recordings import humaneva
 from shadowpuppet.body.models import make_body, sizes_kind
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
@@ -25,7 +26,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import read_calibration, write_calibration
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.synthetic import Spec, humaneva, synthesize
+from shadowpuppet.synthetic import Spec, synthesize
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 
 BODY = "cylinders"

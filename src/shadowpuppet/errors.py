@@ -155,7 +155,7 @@ def is_out_of_memory(error: BaseException) -> bool:
 
 
 def check_regular(path: Path) -> None:
-    """Raise `OSError` for what is no file, such as a pipe, which would be waited for without end, or a device."""
+    """Raise `OSError` for anything but a file, such as a pipe, which would be waited for without end, or a device."""
     kind = path.stat().st_mode
     if not stat.S_ISREG(kind):
         raise OSError(errno.EINVAL, "is a directory" if stat.S_ISDIR(kind) else "is a pipe or a device, expected a file")
@@ -165,7 +165,7 @@ class ShadowPuppetWarning(UserWarning):
     """A problem that does not stop the work."""
 
     def __str__(self) -> str:
-        """The sentence, as that of a `ShadowPuppetError`."""
+        """The sentence, as of a `ShadowPuppetError`."""
         return one_line(super().__str__())
 
 

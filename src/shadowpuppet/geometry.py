@@ -44,6 +44,15 @@ def vector_from_rotation(R: ArrayLike) -> Array:
     return np.zeros(3) if sine == 0 else vector * (2 * np.arctan2(sine, abs(w)) / sine)
 
 
+def shortest_rotation(start: ArrayLike, end: ArrayLike, least: float) -> Array:
+    """Rotations (..., 3, 3) of least angle from unit vectors (..., 3) to others; `least`: of 1 + cosine, which vanishes at half a turn."""
+    start, end = np.broadcast_arrays(np.asarray(start, float), np.asarray(end, float))
+    axis, cosine = np.cross(start, end), (start * end).sum(-1)
+    K = np.zeros((*axis.shape, 3))
+    K[..., [2, 0, 1], [1, 2, 0]], K[..., [1, 2, 0], [2, 0, 1]] = axis, -axis
+    return np.eye(3) + K + K @ K / np.maximum(1 + cosine, least)[..., None, None]
+
+
 def rigid(R: ArrayLike, t: ArrayLike) -> Array:
     """Homogeneous transforms (..., 4, 4) from rotations (..., 3, 3) and translations (..., 3)."""
     R, t = np.asarray(R, float), np.asarray(t, float)

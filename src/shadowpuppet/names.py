@@ -10,11 +10,11 @@ T = TypeVar("T")
 
 
 def composed(name: str) -> str:
-    """A name in the form in which names are compared (NFC); what is written keeps its own."""
+    """A name in the form in which names are compared (NFC); written names keep their own."""
     return normalize("NFC", name)
 
 
 def spelled_as(by_name: Mapping[str, T], known: Iterable[str]) -> dict[str, T]:
-    """Values by names, in which those that are among `known` are spelled as there."""
+    """Values by names, where `known` names are spelled as there."""
     spelling = {composed(name): name for name in known}
     return {spelling.get(composed(name), name): value for name, value in by_name.items()}

@@ -151,9 +151,10 @@ def page_headers(policy: str) -> dict[str, str]:
 class Connections:
     """Counts a server's connections, of each address and in all. Thread-safe."""
 
-    def __init__(self, most: int, most_of_address: int) -> None:
-        """The greatest numbers."""
-        self.most, self.most_of_address = most, most_of_address
+    def __init__(self, most: int | None = None, most_of_address: int | None = None) -> None:
+        """The greatest numbers; by default `MAX_CONNECTIONS` and `MAX_OF_ADDRESS`."""
+        self.most = MAX_CONNECTIONS if most is None else most
+        self.most_of_address = MAX_OF_ADDRESS if most_of_address is None else most_of_address
         self._of = Counter[str]()
         self._lock = threading.Lock()
 
@@ -181,7 +182,7 @@ class Connections:
 
 
 def silent_logger(name: str) -> Any:
-    """A logger without output: clients that break off, or send what is no request, are no problem of a session."""
+    """A logger without output: clients that break off or send no valid request are no problem of a session."""
     import logging
 
     logger = logging.getLogger(name)

@@ -11,8 +11,6 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 from shadowpuppet.network import (
-    MAX_CONNECTIONS,
-    MAX_OF_ADDRESS,
     REQUEST_SECONDS,
     SEND_SECONDS,
     Connections,
@@ -27,14 +25,14 @@ PIECE = 65536
 
 
 class PageServer(ThreadingHTTPServer):
-    """Answers each connection in a thread of its own, `MAX_CONNECTIONS` at a time, of them `MAX_OF_ADDRESS` with one address."""
+    """Answers each connection in a thread of its own, within the limits of `network.Connections`."""
 
     daemon_threads = True
     allow_reuse_address = False
 
     def __init__(self, handler: type[PageHandler], listen: str, port: int) -> None:
         """Listen at an address and port (0: any). Raises `OSError` if these are not available."""
-        self._connections = Connections(MAX_CONNECTIONS, MAX_OF_ADDRESS)
+        self._connections = Connections()
         self.loopback, self.address_family = is_loopback(listen), address_family(listen)
         super().__init__((listen, port), handler)
 

@@ -19,6 +19,9 @@ SETTINGS = {
     "silhouette.maintain": "the background no longer follows lasting changes: leave them out with --region, or take masks of another "
                            "program (shadowpuppet masks)",
     "silhouette.method = knn": "found knn, which is gone; mog2 does the same as well, and auto better",
+    **{f"like = humaneva_{motion}": f"humaneva_{motion} has moved: papers/ni2008/recordings.py in the source repository makes its spec"
+       for motion in ("walking", "jogging", "boxing")},
+    "joints = humaneva": "found humaneva, which is gone: its 15 joints are pelvis,neck,head,limbs",
 }
 """By the setting's name with dots, or by its name and a value."""
 BOUGUET = ("found a calibration of Bouguet's toolbox, which is not read any more, expected calibration.toml or OpenCV's YAML; a trial of "

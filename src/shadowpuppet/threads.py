@@ -69,7 +69,7 @@ def limit_threads() -> None:
 
 
 class MadeOnDemand(Sequence[T], Generic[T]):
-    """A sequence whose items are made when they are asked for by number, each once. Iterating makes them all, on several cores."""
+    """A sequence whose items are made at the first request by number. Iterating makes them all, on several cores."""
 
     def __init__(self, make: Callable[[int], T], count: int) -> None:
         """Of `count` items; `make` gives the one of a number."""
@@ -92,7 +92,7 @@ class MadeOnDemand(Sequence[T], Generic[T]):
         if n not in self._items and (make := self._make) is not None:
             self._items[n] = make(n)
             if len(self._items) == self._count:
-                self._make = None  # and with it what they are made from
+                self._make = None  # and with it their sources
         return self._items[n]
 
     def __iter__(self) -> Iterator[T]:

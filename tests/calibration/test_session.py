@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from shadowpuppet.calibration import session as session_module
-from shadowpuppet.calibration.boards.board import board_text
+from shadowpuppet.calibration.boards.board import board_from, board_text
 from shadowpuppet.calibration.session import calibrate, open_session
 from shadowpuppet.calibration.solve.bundle import Bundle, Solved
 from shadowpuppet.calibration.solve.placement import Placement
 from shadowpuppet.cli.app import run
 from shadowpuppet.errors import CalibrationError
-from shadowpuppet.io.calibration.calibration_files import read_calibration
+from shadowpuppet.io.calibration.calibration_files import read_calibration, write_calibration
 
 SIZE = (960, 720)
 
@@ -52,6 +52,25 @@ def test_a_session_of_pictures(copy, capsys):
     assert "What to film again" in page
     assert "<svg" in page
     assert "cam2" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("board", "said"), [(boards.BOARD, True), (board_from("checkerboard 8x5", 0.1), False)],
+                         ids=["charuco", "checkerboard"])  # fmt: skip
+def test_a_board_printed_inverted_needs_no_setting(tmp_path, capsys, board, said):
+    lab = boards.pictured(tmp_path / "lab", rig(), 5, inverted=True, board=board)
+    write_calibration(lab / "lenses.toml", rig())
+    assert run(["calibrate", str(lab), "--lenses", str(lab / "lenses.toml")]) in (0, 1)
+    for true, camera in zip(rig(), read_calibration(lab / "calibration.toml")):
+        T = true.T_camera_world @ np.diag([-1, -1, 1, 1]) if board.kind == "checkerboard" else true.T_camera_world
+        assert np.linalg.norm(camera.centre - replace(true, T_camera_world=T).centre) < 0.05
+    sentence = "the board is printed inverted, black and white exchanged: found so by cam1, cam2"
+    assert (sentence in " ".join(capsys.readouterr().out.split())) == said
+    assert (sentence in (lab / "calibration.html").read_text()) == said
+
+
+def test_a_board_printed_as_described_is_not_said_to_be_inverted(copy):
+    found = calibrate(open_session(copy), {camera.name: camera for camera in rig()})
+    assert not any("inverted" in note for note in found.notes)
 
 
 def test_given_lenses_are_kept(copy):

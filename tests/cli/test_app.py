@@ -148,15 +148,24 @@ def test_the_version_is_reported_by_the_module_too():
     (["track", "here", "--silhouette.method", "magic"], "magic"),
     (["track", "here", "--height", "180"], "flags: height: found 180.0; expected 0.5 to 2.5 metres (180 cm are 1.8)"),
     (["info", "here", "--distance", "nan"], "flags: distance: found nan; expected 0.2 to 30 metres"),
+    (["track", "here", "--people", "0"], "flags: people: found 0; input should be greater than or equal to 1"),
+    (["info", "here", "--people", "7"], "flags: people: found 7; input should be less than or equal to 6"),
+    (["track", "here", "--people", "two"], '--people: unable to convert "two" into int'),
+    (["live", "film.mp4", "--people", "2"], "people: found 2 for a live session, expected 1: `track` follows several"),
     (["track", "here", "--tracker.motion-weight", "inf"], "tracker: motion_weight: found inf; input should be a finite number"),
     (["track", "here", "--config", "none.toml"], "none.toml: cannot be read (no such file"),
     (["track", "here"], "here: no such recording, expected a folder with video/ and calibration.toml, or a film"),
-    (["evaluate", "here"], "here: no such folder, expected that of a run, as `shadowpuppet track` writes it"),
-    (["export", "here"], "here: no such folder, expected that of a run"),
+    (["evaluate", "here"], "here: no such folder, expected a run's, as `shadowpuppet track` writes it"),
+    (["export", "here"], "here: no such folder, expected a run's"),
     (["settings", "--preset", "liu"], "unknown preset 'liu'"),
 ])  # fmt: skip
 def test_what_cannot_be_meant_is_said_in_a_line(shell, tokens, said):
     assert said in refused(shell, *tokens)
+
+
+@pytest.mark.parametrize("command", ["track", "info"])
+def test_one_camera_follows_one_person(shell, recording, command):
+    assert "people: found 2 for one camera, expected 1: two calibrated cameras or more" in refused(shell, command, recording, "--people", 2)
 
 
 # Use

@@ -225,3 +225,11 @@ def test_pictures_and_films_that_are_too_large_are_named(tmp_path, monkeypatch):
     monkeypatch.setattr(av, "open", out_of_memory("av")[0])
     with pytest.raises(VideoError, match=r"room\.png: too large for the memory of this machine \(cannot allocate memory"), opened(path):
         pass
+
+
+def test_frames_that_are_not_later_are_one_line_for_all_films(capsys):
+    listener = Terminal()
+    for film in ("a.mp4", "b.mp4"):
+        listener.warn(f"{film}: the frame at 0.200 s is followed by one that is not later; times are moved so that they increase")
+        listener.warn(f"{film}: the film breaks off")
+    assert [line.split(":")[1] for line in capsys.readouterr().err.splitlines()] == [" a.mp4", " a.mp4", " b.mp4"]

@@ -19,7 +19,6 @@ from shadowpuppet.evaluation.error_metrics import (
     axis_errors,
     bone_errors,
     hinge_errors,
-    humaneva_error,
     pose_losses,
     world_difference,
 )
@@ -154,23 +153,6 @@ def test_a_bad_run_is_not_taken_for_another_world():
 
 
 # Posture, motion, bones
-
-
-def test_humaneva_s_error_is_the_mean_over_its_fifteen():
-    run = noisy()
-    names = ["pelvis", "neck", "head", *LIMB_JOINTS]
-    frames = [np.mean([math.dist(run.positions[t, NAMES.index(n)], TRUTH.positions[t, NAMES.index(n)]) for n in names])
-              for t in range(len(run.times))]
-    found = humaneva_error(run, TRUTH)
-    assert (found["mean_mm"], found["sd_mm"]) == pytest.approx((1000 * np.mean(frames), 1000 * np.std(frames)))
-    gaps = TRUTH.positions.copy()
-    gaps[:7, NAMES.index("left_knee")] = np.nan
-    partly = humaneva_error(run, JointTable(TRUTH.times, TRUTH.names, gaps))
-    assert (partly["mean_mm"], partly["frames"]) == (pytest.approx(1000 * np.mean(frames[7:])), len(frames) - 7)
-    gaps[:, NAMES.index("left_knee")] = np.nan
-    assert humaneva_error(run, JointTable(TRUTH.times, TRUTH.names, gaps)) == {"missing": {"run": [], "truth": ["left_knee"]}}
-    fewer = TRUTH.select([name for name in NAMES if name != "head"])
-    assert humaneva_error(run, fewer) == {"missing": {"run": [], "truth": ["head"]}}
 
 
 def test_an_elbow_is_as_far_bent_as_it_is():

@@ -28,7 +28,7 @@ MEASURED = {
     "errors": ERROR | {"frames": 60, "lost": 7, "joints": {"left_wrist": ERROR, "head": ERROR}},
     "aligned_mm": {"none": 12.34, "whole": 11.0, "frame_offset": 10.0, "root": 9.5, "rigid": 8.25, "root_joint": "left_hip and right_hip"},
     "axes_mm": {axis: {"mean": n - 1.5, "sd": 2.25, "rmse": 3.5} for n, axis in enumerate("xyz")},
-    "humaneva": {"mean_mm": 13.7, "sd_mm": 2.5}, "acceleration": {"run_m_s2": 5.25, "truth_m_s2": 3.75, "difference_m_s2": 4.5},
+    "acceleration": {"run_m_s2": 5.25, "truth_m_s2": 3.75, "difference_m_s2": 4.5},
     "overlap": {"count": 60, "mean": 0.9123, "p5": 0.8456},
     "losses": {"frames": 7, "share": 0.1167, "gaps": 2, "longest_frames": 5, "longest_s": 0.333, "longest_from_s": 1.267},
     "world": {"moved": False, "apart": True, "mean_mm": 512.4, "aligned_mm": 30.6, "rotation_deg": 90.04, "moved_mm": [300.0, 400.0, 0.0]},
@@ -59,7 +59,6 @@ def test_cards():
     assert list(sections._cards(evaluation())) == [
         ("The run's own verdict", "good", "", "nothing speaks against it"),
         ("Joint error", "12.3", "mm", "mean of 2 joints; rmse 15.6"),
-        ("HumanEva", "13.7", "mm", "mean of its 15 joints; sd over frames 2.5"),
         ("Posture alone", "8.2", "mm", "each frame moved and turned onto the truth"),
         ("Depth", "9.1", "mm", "along the camera's axis; 4.6 across it"),
         ("Far off", "1.2", "%", "of joints are over 300 mm off; worst 100 mm"),
@@ -67,7 +66,7 @@ def test_cards():
         ("Overlap", "0.912", "", "with the silhouettes; p5 0.846"),
         ("Without a pose", "7", "frames", "11.7 %, the longest 0.33 s"),
     ]
-    little = evaluation(humaneva={}, acceleration={}, overlap={"count": 0}, losses={"frames": 0, "share": 0.0, "longest_s": 0.0},
+    little = evaluation(acceleration={}, overlap={"count": 0}, losses={"frames": 0, "share": 0.0, "longest_s": 0.0},
                         errors={key: value for key, value in MEASURED["errors"].items() if key not in ("depth_mm", "plane_mm")})
     assert [name for name, *_ in sections._cards(little)] == ["The run's own verdict", "Joint error", "Posture alone", "Far off",
                                                             "Without a pose"]

@@ -28,7 +28,7 @@ from shadowpuppet.io.motion.c3d import read_c3d, read_header
 from shadowpuppet.io.motion.c3d_writer import write_c3d
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.npz import read_motion_npz
-from shadowpuppet.io.motion.opensim.markers import MARKERS
+from shadowpuppet.io.motion.opensim.model_writer import MARKERS
 from shadowpuppet.io.motion.opensim.mot import read_mot
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.io.run import read_run

@@ -89,11 +89,20 @@ def test_of_two_people_s_heights_none_is_taken(pose2sim):
     assert read_recording(pose2sim).subject.height is None
 
 
+@pytest.mark.parametrize(("text", "several"), [("", False), ("multi_person = false\n", False), ("multi_person = true\n", True)])
+def test_a_project_may_state_several_people(pose2sim, text, several):
+    (pose2sim.parent / "Config.toml").write_text(f"[project]\n{text}")
+    assert read_recording(pose2sim).several == several
+
+
 @pytest.mark.parametrize(("text", "said"), [
     ("participant_height = 172", "project.participant_height: found 172, expected 0.5 to 2.5 metres"),
     ("frame_range = [10]", r"project.frame_range: found \[10\], expected 'auto', 'all', or the first and last frame"),
     ("frame_range = [10, 3]", r"project.frame_range: found \[10, 3\]"),
     ("frame_range = [0.5, 3]", r"project.frame_range: found \[0.5, 3\]"),
+    (f"frame_range = [0, {'9' * 400}]", r"project.frame_range: found \[0, 9+"),
+    (f"frame_rate = {'9' * 400}", r"project.frame_rate: found 9+"),
+    ("frame_rate = [20]", r"project.frame_rate: found \[20\], expected 0.1 to 10000 frames/s"),
     ("frame_range = [", "not valid TOML"),
 ])
 def test_settings_of_pose2sim_that_cannot_be_meant_are_reported(pose2sim, text, said):

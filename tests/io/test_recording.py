@@ -416,3 +416,30 @@ def test_films_that_miss_frames_keep_their_times(two, tmp_path):
         assert is_steady(two / "video" / f"{name}.mp4") == (name == "left")
     assert open_frames(two / "video" / "right.mp4").rate < 29.6
     assert read_recording(two).rate is None
+
+
+def folder_of(two, name, number):
+    (two / "video" / f"{name}.mp4").unlink()
+    (two / "video" / name).mkdir()
+    for n in range(number):
+        write_image(two / "video" / name / f"{n:03d}.png", picture())
+
+
+def test_folders_of_pictures_beside_films_need_no_rate(two):
+    folder_of(in_rates(two, 25.0, 25.0, number=10), "right", 10)
+    assert read_recording(two).rate == 25.0  # no warning
+    (two / "video" / "right" / "timestamps.txt").write_text("\n".join(str(n / 50) for n in range(10)))
+    assert read_recording(two).rate is None
+
+
+def test_pictures_that_are_fewer_than_the_films_frames_are_counted(two):
+    folder_of(in_rates(two, 25.0, 25.0, number=10), "right", 8)
+    with pytest.warns(ShadowPuppetWarning, match=r"right: found 8 pictures without timestamps.txt beside films of 10 frames: they are "
+                                                 "taken at the films' 25 frames/s"):
+        assert read_recording(two).rate == 25.0
+
+
+def test_folders_of_pictures_alone_keep_the_assumed_rate(two):
+    for name in ("left", "right"):
+        folder_of(two, name, 4)
+    assert read_recording(two).rate is None

@@ -19,7 +19,7 @@ import stand_in_ros
 from scipy.spatial.transform import Rotation
 
 from shadowpuppet.live.stream.choice import open_outlets
-from shadowpuppet.live.stream.outlet import Outlets, Subject
+from shadowpuppet.live.stream.outlet import Outlets, StreamSubject
 from shadowpuppet.live.stream.settings import OutletSettings
 from shadowpuppet.live.stream.websocket import WebSocketOutlet
 from shadowpuppet.motion.limbs import LIMBS, limb_of
@@ -32,7 +32,7 @@ AGE = 0.02
 
 @pytest.fixture(scope="module")
 def who():
-    return Subject(runs.body_of("anatomical"), np.eye(4), 1.78, 0.0)
+    return StreamSubject(runs.body_of("anatomical"), np.eye(4), 1.78, 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def frame(who):
 
 
 @contextlib.contextmanager
-def sending(outlets: Outlets, who: Subject, frame: MotionFrame):
+def sending(outlets: Outlets, who: StreamSubject, frame: MotionFrame):
     """A person is tracked within the block."""
     over = threading.Event()
 

@@ -20,22 +20,21 @@ from hypothesis import strategies as st
 from shadowpuppet import network, page_server
 from shadowpuppet.errors import SettingsError, ShadowPuppetWarning
 from shadowpuppet.live.display import web
-from shadowpuppet.live.display.choice import open_display
 from shadowpuppet.live.display.drawing import drawn
-from shadowpuppet.live.display.view import Angle, Display, View
+from shadowpuppet.live.display.view import Display, DofAngle, SessionState, open_display
 from shadowpuppet.live.display.web import PORT, WebDisplay
 from shadowpuppet.video import read_image
 
 ROOM = np.full((120, 160, 3), 90, np.uint8)
 
 
-def tracked(**more) -> View:
+def tracked(**more) -> SessionState:
     picture = people.picture("rounded")
     pose = np.zeros(len(picture.body.skeleton.dofs))
-    angles = tuple(Angle(f"{part} {name}", 20.0, -40, 90) for part in ("torso", "left", "right") for name in ("bend", "twist"))
+    angles = tuple(DofAngle(f"{part} {name}", 20.0, -40, 90) for part in ("torso", "left", "right") for name in ("bend", "twist"))
     known = {"phase": "tracking", "status": "tracked", "overlap": 0.91, "angles": angles, "latency": 0.012, "rate": 15.0,
              "interval": 1 / 15, "image": ROOM, "mask": picture.mask(pose), "picture": picture, "pose": pose}
-    return View(**known | more)
+    return SessionState(**known | more)
 
 
 # Pictures
@@ -64,25 +63,25 @@ def test_what_is_not_tracked_is_dimmed(more, darker):
 
 
 def test_grey_and_large_pictures_and_none():
-    assert drawn(View(phase="waiting")) is None
-    grey = drawn(View(phase="waiting", image=ROOM[..., 0]))
+    assert drawn(SessionState(phase="waiting")) is None
+    grey = drawn(SessionState(phase="waiting", image=ROOM[..., 0]))
     assert grey is not None
     assert grey.shape == (480, 640, 3)
-    large = drawn(View(phase="waiting", image=np.zeros((1080, 1920, 3), np.uint8)))
+    large = drawn(SessionState(phase="waiting", image=np.zeros((1080, 1920, 3), np.uint8)))
     assert large is not None
     assert large.shape == (540, 960, 3)
 
 
 @given(st.floats(allow_nan=True), st.floats(allow_nan=True), st.none() | st.floats(allow_nan=True))
 def test_figures_are_json_whatever_is_not_known(latency, overlap, countdown):
-    view = View(phase="waiting", latency=latency, overlap=overlap, countdown=countdown, angles=(Angle("a b", latency, 0, 1),))
+    view = SessionState(phase="waiting", latency=latency, overlap=overlap, countdown=countdown, angles=(DofAngle("a b", latency, 0, 1),))
     json.dumps(view.figures(), allow_nan=False)
 
 
 def test_the_chip_says_what_matters():
     assert tracked().chip == "tracked"
     assert tracked(trouble="unplugged").chip == "paused"
-    assert View(phase="measuring").chip == "measuring"
+    assert SessionState(phase="measuring").chip == "measuring"
     assert tracked(status="").chip == "tracking"
     assert tracked(trouble="unplugged").figures()["message"] == "unplugged"
 
@@ -217,13 +216,21 @@ def test_the_page_listens_to_this_machine_alone_by_default(page):
         assert ask(wide, "/")[0].status == 200
 
 
-def test_no_more_than_so_many_are_served_and_who_leaves_makes_room(monkeypatch):
-    monkeypatch.setattr(page_server, "MAX_CONNECTIONS", 2)
-    with WebDisplay(port=0) as page:
+@contextlib.contextmanager
+def page_of_two(monkeypatch, limit):
+    """A page that serves two connections by a limit, the address of its server, and a third connection while the two are open."""
+    monkeypatch.setattr(network, limit, 2)
+    with WebDisplay(port=0) as page, contextlib.ExitStack() as stack:
         address = ("127.0.0.1", page.server.server_port)
-        with socket.create_connection(address), socket.create_connection(address), socket.create_connection(address) as third:
-            third.settimeout(60)
-            assert third.recv(1) == b""
+        third = [stack.enter_context(socket.create_connection(address)) for _ in range(3)][-1]
+        third.settimeout(60)
+        yield page, address, third, stack
+
+
+def test_a_full_server_serves_again_after_a_connection_ends(monkeypatch):
+    with page_of_two(monkeypatch, "MAX_CONNECTIONS") as (page, _, third, stack):
+        assert third.recv(1) == b""
+        stack.close()
         end = time.monotonic() + 60
         while True:  # the first two are noticed to be gone
             with contextlib.suppress(OSError, http.client.HTTPException):
@@ -234,22 +241,18 @@ def test_no_more_than_so_many_are_served_and_who_leaves_makes_room(monkeypatch):
 
 
 def test_one_address_does_not_take_all_connections(monkeypatch):
-    monkeypatch.setattr(page_server, "MAX_OF_ADDRESS", 2)
-    with WebDisplay(port=0) as page:
-        address = ("127.0.0.1", page.server.server_port)
-        with socket.create_connection(address), socket.create_connection(address), socket.create_connection(address) as third:
-            third.settimeout(10)
-            with contextlib.suppress(ConnectionError):
-                third.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
-                assert third.recv(1) == b""
-            try:
-                other = socket.create_connection(address, source_address=("127.0.0.2", 0))
-            except OSError:
-                pytest.skip("this machine has one address of its own")
-            with other:
-                other.settimeout(10)
-                other.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
-                assert other.recv(100).split(b"\r\n")[0].split()[1] == b"200"
+    with page_of_two(monkeypatch, "MAX_OF_ADDRESS") as (_, address, third, _stack):
+        with contextlib.suppress(ConnectionError):
+            third.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+            assert third.recv(1) == b""
+        try:
+            other = socket.create_connection(address, source_address=("127.0.0.2", 0))
+        except OSError:
+            pytest.skip("this machine has one address of its own")
+        with other:
+            other.settimeout(60)
+            other.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+            assert other.recv(100).split(b"\r\n")[0].split()[1] == b"200"
 
 
 def reading_nothing(port: int, path: str) -> socket.socket:
@@ -264,7 +267,7 @@ def reading_nothing(port: int, path: str) -> socket.socket:
 def test_clients_that_read_nothing_are_dropped_and_the_page_comes(monkeypatch):
     """Without a limit of the time to send, they would keep others out as long as they like."""
     monkeypatch.setattr(page_server, "SEND_SECONDS", 0.2)
-    monkeypatch.setattr(page_server, "MAX_OF_ADDRESS", 3)
+    monkeypatch.setattr(network, "MAX_OF_ADDRESS", 3)
     view = tracked(image=np.random.default_rng(1).integers(0, 255, (720, 960, 3), np.uint8), mask=None, picture=None, pose=None)
     with contextlib.ExitStack() as stack:
         page = stack.enter_context(WebDisplay(port=0))
@@ -403,7 +406,7 @@ def test_keys_of_the_page_are_commands(page, monkeypatch):
 def test_a_picture_is_drawn_once_for_all_pages_that_ask_at_once(page, monkeypatch):
     drawings, got, view = [], [], tracked()
 
-    def slow(shown: View) -> np.ndarray | None:
+    def slow(shown: SessionState) -> np.ndarray | None:
         drawings.append(shown)
         time.sleep(0.2)
         return drawn(shown)
@@ -442,7 +445,7 @@ def test_angles_of_every_body_are_shown(page):
     complaints, body = [], make_body("anatomical", average_sizes("anatomical", 1.75))
     angles = _angles(body, np.zeros(len(body.skeleton.dofs)))
     with browsed(page, complaints) as opened:
-        page.show(View(phase="tracking", status="tracked", image=ROOM, angles=angles, latency=0.012, interval=1 / 15))
+        page.show(SessionState(phase="tracking", status="tracked", image=ROOM, angles=angles, latency=0.012, interval=1 / 15))
         wait(opened, lambda: opened.locator(".angle").count() == len(angles), "each has a bar")
         wait(opened, lambda: opened.inner_text("#latency") == "12", "the latency is said")
     assert complaints == []

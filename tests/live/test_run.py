@@ -26,12 +26,14 @@ from live_film import EMPTY, FLAGS, FOV, HEIGHT, QUICK, RATE, frames
 from websockets.sync.client import connect
 
 from shadowpuppet.cli import app as cli
-from shadowpuppet.errors import ShadowPuppetWarning, VideoError
+from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, VideoError
+from shadowpuppet.io import run_writer
+from shadowpuppet.io.files.lock import LOCK
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
+from shadowpuppet.io.run_writer import write_metrics
 from shadowpuppet.live import run as live_run
-from shadowpuppet.live.display.listener import LiveListener
-from shadowpuppet.live.display.view import Display
+from shadowpuppet.live.display.view import Display, LiveListener
 from shadowpuppet.live.run import run_live
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.sources import lens
@@ -248,6 +250,32 @@ def test_the_stop_button_ends_a_run_that_is_whole(film, tmp_path):
     run = read_run(tmp_path / "run")
     assert (run.complete, len(run.motion)) == (True, 8)
     assert metrics == run.metrics
+
+
+def test_a_film_that_changes_while_it_is_played_makes_no_complete_run(film, tmp_path):
+    own, heard = tmp_path / "own.mp4", Heard()
+    own.write_bytes(film.read_bytes())
+
+    class Changes(Presses):
+        def command(self):
+            os.utime(own, (1, 1))
+            return super().command()
+
+    with pytest.raises(ShadowPuppetError, match=r"run: own.mp4 has changed while the run went on: it is not complete"):
+        run_live(tmp_path / "run", OPTIONS, replace(SETTINGS, camera=str(own)), heard, Changes(heard, 8))
+    assert not read_run(tmp_path / "run").complete
+
+
+def test_measures_are_written_while_the_folder_is_locked(film, tmp_path, monkeypatch):
+    heard, seen = Heard(), list[tuple[bool, set[str]]]()
+
+    def written(folder, metrics):
+        seen.append(((folder / LOCK).exists(), set(metrics)))
+        write_metrics(folder, metrics)
+
+    monkeypatch.setattr(run_writer, "write_metrics", written)
+    metrics = run_live(tmp_path / "run", OPTIONS, replace(SETTINGS, camera=str(film)), heard, Presses(heard, 4))
+    assert seen == [(True, set(metrics))]  # no measure comes after the lock is given back
 
 
 def begun(film, folder, **more):

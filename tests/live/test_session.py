@@ -18,7 +18,7 @@ from shadowpuppet.errors import SettingsError
 from shadowpuppet.live import base_session
 from shadowpuppet.live.first_look import look_at, scene_of
 from shadowpuppet.live.phases import KEPT, MOVING, BackgroundCollector, StandStillDetector, in_background, unfit
-from shadowpuppet.live.session import Session
+from shadowpuppet.live.session import CameraSession
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.live.watchdog import FIRST_PATIENCE, CameraWatchdog
@@ -43,7 +43,7 @@ class Stage:
         self.clock, self.number = Clock(), 0
         full, dog = Camera.from_fov(size, np.radians(60)), CameraWatchdog("cam", size, live)
         more = {} if work is None else {"work": work}
-        self.session = Session(options, settings, np.random.default_rng(1), self.clock, Timing(RATE), full=full, watchdog=dog, **more)
+        self.session = CameraSession(options, settings, np.random.default_rng(1), self.clock, Timing(RATE), full=full, watchdog=dog, **more)
 
     def give(self, image, after=1 / RATE, cost=0.0):
         """A picture after some seconds, which takes some seconds to work on."""
@@ -222,7 +222,7 @@ def test_in_plain_silhouettes_people_are_tracked_but_not_measured(pictures, silh
 def test_a_known_background_is_not_learnt_again(pictures):
     full = Camera.from_fov(SIZE, np.radians(60))
     parts = np.random.default_rng(1), Clock(), Timing(RATE)
-    session = Session(OPTIONS, SETTINGS, *parts, full=full, watchdog=CameraWatchdog("cam", SIZE, True), scene=pictures[0][:5])
+    session = CameraSession(OPTIONS, SETTINGS, *parts, full=full, watchdog=CameraWatchdog("cam", SIZE, True), scene=pictures[0][:5])
     assert session.phase == "waiting"
 
 

@@ -19,7 +19,7 @@ from shadowpuppet.motion.inverse_kinematics import (
     SMOOTH_PULL,
     TRUNK_SMOOTH_PULL,
     _at_limits,
-    _Linear,
+    _Equations,
     _Problem,
     _solve_chain,
     _solve_step,
@@ -266,7 +266,7 @@ def test_the_chain_is_solved_as_the_whole_matrix(T, D, S, seed):
     rng = np.random.default_rng(seed)
     J = rng.standard_normal((T, 3 * D, D + S))
     H = np.swapaxes(J, 1, 2) @ J
-    equations = _Linear(H[:, :D, :D], H[:, :D, D:], H[:, D:, D:].sum(0) + np.eye(S), rng.standard_normal((T, D)), rng.standard_normal(S))
+    equations = _Equations(H[:, :D, :D], H[:, :D, D:], H[:, D:, D:].sum(0) + np.eye(S), rng.standard_normal((T, D)), rng.standard_normal(S))
     links, held, damping = rng.uniform(0, 2, (T - 1, D)), rng.random((T, D)) < 0.2, 0.1
     M = np.zeros((T * D + S, T * D + S))
     for t in range(T):
@@ -346,7 +346,7 @@ def test_only_what_would_leave_its_limits_is_held_there(rng):
     held = _at_limits(poses, downhill, low, high)
     np.testing.assert_array_equal(held, [[True, False, False, False, True]])
     half = rng.normal(size=(5, 5))
-    equations = _Linear((half @ half.T + np.eye(5))[None], np.zeros((1, 5, 0)), np.zeros((0, 0)), downhill, np.zeros(0))
+    equations = _Equations((half @ half.T + np.eye(5))[None], np.zeros((1, 5, 0)), np.zeros((0, 0)), downhill, np.zeros(0))
     step, _ = _solve_step(equations, np.zeros((0, 5)), 0.0, held)
     np.testing.assert_array_equal(step[held], 0)
     free = ~held[0]

@@ -16,7 +16,9 @@ from papers.common.claims import DEPENDS, Answer
 from papers.common.experiment import Request
 from papers.ni2008 import choices, figure_4, figure_6, figure_7, figure_8, inputs, measures, models, particles, table_2, tracks
 from papers.ni2008.__main__ import EXPERIMENTS, main
-from shadowpuppet.synthetic import Ring, Scene, Spec, humaneva, synthesize
+from papers.ni2008.recordings import humaneva
+from shadowpuppet.synthetic import Ring, Scene, Spec, synthesize
+from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.tracking.multiview.settings import make_multiview_settings
 
@@ -431,3 +433,21 @@ def test_the_force_points_at_the_scene_point_and_is_bounded(out):
     away = (P - foot) / np.linalg.norm(P - foot)
     np.testing.assert_allclose(F, away * make_multiview_settings("ni2008").forces.fine_tau, atol=1e-3)
     np.testing.assert_allclose(M, np.cross(foot - c, F), atol=1e-3)
+
+
+def test_recordings_like_humanevas_are_of_the_papers_sizes():
+    for spec, (motion, count) in zip(humaneva(), (("walk", 433), ("jog", 393), ("box", 377)), strict=True):
+        times, figure = perform(spec, np.random.default_rng(spec.seed))
+        assert [gesture.motion for gesture in spec.motion] == [motion]
+        assert (len(times), spec.training_frames, spec.rate, len(spec.views())) == (count, 100, 60.0, 7)
+        hips = figure.joints[:, :1]
+        if motion != "box":  # from the first picture to the last they go
+            assert np.linalg.norm(np.diff(hips[:, 0, :2], axis=0), axis=1).min() > 0.5 / 60
+        else:  # and hands move in every half second
+            hands = figure.joints - hips
+            assert min(np.ptp(hands[n : n + 30], axis=0).max() for n in range(0, count - 30, 10)) > 0.05
+        for view in spec.views():
+            pixels = view.camera().project(figure.joints.reshape(-1, 3))
+            assert view.size == (640, 480)
+            assert (pixels > 20).all()
+            assert (pixels < np.array(view.size) - 20).all()  # nobody is cut

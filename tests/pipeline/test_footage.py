@@ -15,6 +15,7 @@ from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.pipeline.findings.cautions import film_cautions
 from shadowpuppet.pipeline.footage import Sample, open_footage, open_recording
 from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.video import write_image
 
 
 @pytest.mark.parametrize(("times", "pace", "jitter"), [([0.0], np.nan, np.nan), ([1.0, 1.1], 0.1, 0.0), ([0, 0.1, 0.2, 0.5], 0.1, 0.0943)])
@@ -50,3 +51,12 @@ def test_a_calibration_with_pixels_of_another_shape_than_the_film_says_is_named(
     square = replace(footage.view.camera, matrix=np.array([[80, 0, 48], [0, 80, 32], [0, 0, 1.0]]))
     (caution,) = film_cautions(replace(footage, view=replace(footage.view, camera=square)))
     assert "cam.mp4: the film says that its pixels are 1.33 times as wide as high, the calibration takes them for 1 times" in caution
+
+
+def test_an_empty_scene_in_pictures_needs_no_rate(tmp_path):
+    (tmp_path / "video").mkdir()
+    encoded(tmp_path / "video" / "cam.mp4", pictures(size=(96, 64)))
+    (tmp_path / "background" / "cam").mkdir(parents=True)
+    for n in range(3):
+        write_image(tmp_path / "background" / "cam" / f"{n}.png", np.full((64, 96, 3), 50, np.uint8))
+    assert len(list(open_footage(tmp_path, make_options({"fov": 60})).empty_scene())) == 3  # no warning of a rate

@@ -251,6 +251,17 @@ def test_a_camera_that_was_turned_is_named_on_the_command_line(spoilt, capsys):
     assert shown.out.count(" px") == 4
 
 
+@pytest.mark.parametrize(("several", "empty"), [(True, False), (True, True), (False, False)])
+def test_several_people_of_a_project_of_which_one_is_found_need_an_empty_scene(spoilt, several, empty):
+    if not empty:
+        shutil.rmtree(spoilt / "background")
+    rig = open_rig(spoilt, Options())
+    recording = replace(rig.recording, several=several)
+    rig = replace(rig, recording=recording, footage=tuple(replace(footage, recording=recording) for footage in rig.footage))
+    refusal = survey_rig(rig, Options()).look.refusal or ""
+    assert ("multi_person = true in Config.toml" in refusal) == (several and not empty)
+
+
 def test_nobody_at_the_same_time_is_refused_before_the_run(tmp_path):
     cameras = made_rig.cameras(3)
     seen = made_rig.masks(cameras, 12)

@@ -45,3 +45,10 @@ def test_a_warning_names_the_caller_s_line_behind_the_wrappers_of_other_packages
         warnings.simplefilter("always")
         one_blas_thread()(np.errstate()(check_used))(make_options({"prior": "walk.npz"}), False)
     assert [each.filename for each in seen] == [__file__]
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_a_label_without_ready_silhouettes_has_no_effect(several):
+    with pytest.warns(ShadowPuppetWarning, match=r"^no effect without ready silhouettes \(--masks\): label$"):
+        check_used(make_options({"label": 2}), several)
+    check_used(make_options({"label": 2, "masks": True}), several)

@@ -110,17 +110,20 @@ def drawn(camera: Camera, T_world_board: Array, board: Board = BOARD, mirrored: 
     return np.ascontiguousarray(image[:, ::-1]) if mirrored else image
 
 
-def pictured(folder: Path, cameras: list[Camera], count: int = 10, mirrored: bool = False) -> Path:
-    """A session of pictures in a folder: cameras without distortion in a narrow arc that see the front of a board."""
+def pictured(folder: Path, cameras: list[Camera], count: int = 10, mirrored: bool = False, inverted: bool = False,
+             board: Board = BOARD) -> Path:
+    """A session of pictures in a folder: cameras without distortion in a narrow arc that see the front of a board, printed `inverted` or
+    not."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "board.toml").write_text(board_text(BOARD))
+    (folder / "board.toml").write_text(board_text(board))
     rng = np.random.default_rng(1)
 
     def write(kind: str, camera: Camera, poses: list[Array]) -> None:
         for n, T in enumerate(poses):
             place = folder / kind / camera.name
             place.mkdir(parents=True, exist_ok=True)
-            cv2.imwrite(str(place / f"{n:02}.png"), drawn(camera, T, mirrored=mirrored))
+            image = drawn(camera, T, board, mirrored)
+            cv2.imwrite(str(place / f"{n:02}.png"), ~image if inverted else image)
 
     middle = np.mean([camera.centre for camera in cameras], axis=0)
     poses = []

@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from papers.ni2008.recordings import humaneva
 from shadowpuppet.synthetic import Bystander, Fault, Gesture, Mannequin, Obstacle, Ring, Scene, Spec, Viewpoint, spec_text
-from shadowpuppet.synthetic.collection import around, humaneva, named_specs, proving_ground, proving_rings, resting
+from shadowpuppet.synthetic.collection import around, named_specs, proving_ground, proving_rings, resting
 from shadowpuppet.synthetic.faults.camera_faults import CameraFaults
 from shadowpuppet.synthetic.faults.kinds import KINDS
 from shadowpuppet.synthetic.movement.actions import ACTIONS

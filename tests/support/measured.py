@@ -10,10 +10,10 @@ from shadowpuppet.evaluation.evaluation import Comparison, measure_run
 from shadowpuppet.evaluation.joint_angles import compared_poses, turn_errors
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.run_writer import RunWriter
-from shadowpuppet.motion.metrics import GROUPS
+from shadowpuppet.motion.metrics import LIMB_JOINTS
 from shadowpuppet.motion.motion import JointTable, MotionFrame
 
-NAMES = (*GROUPS["humaneva"], "left_hand", "right_hand")
+NAMES = ("pelvis", "neck", "head", *LIMB_JOINTS, "left_hand", "right_hand")
 BODY = {"pelvis": (0, 0, 0.95), "neck": (0, 0, 1.5), "head": (0.02, 0, 1.6)}
 for _side, _y in (("left", 1), ("right", -1)):
     BODY |= {f"{_side}_shoulder": (0, 0.18 * _y, 1.45), f"{_side}_elbow": (0, 0.22 * _y, 1.15), f"{_side}_wrist": (0.1, 0.22 * _y, 0.92),

@@ -32,13 +32,12 @@ from shadowpuppet.synthetic import (
 from shadowpuppet.synthetic.movement import gestures
 from shadowpuppet.synthetic.movement.sequence import sequence_seconds
 from shadowpuppet.synthetic.person.clothes import Clothes
-from shadowpuppet.synthetic.person.dressed import dressed
 from shadowpuppet.synthetic.person.kinematics import CHANNELS, SEGMENTS, pose
 from shadowpuppet.synthetic.person.mannequin import FRACTIONS, JOINTS, MEASURES
 from shadowpuppet.synthetic.person.surface import Surface, ellipsoid
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
-from shadowpuppet.synthetic.scene_renderer import Place, SceneRenderer
+from shadowpuppet.synthetic.scene_renderer import EmptyStage, SceneRenderer, dressed
 from shadowpuppet.synthetic.truth import SOLES
 from shadowpuppet.video import open_frames, read_image
 
@@ -327,7 +326,7 @@ def test_the_room_does_not_shine_through_the_person(rng, monkeypatch):
     solid = solid & np.roll(solid, 1, 0) & np.roll(solid, -1, 0) & np.roll(solid, 1, 1) & np.roll(solid, -1, 1)
     pictures = []
     for light in (0.0, 1.0):
-        monkeypatch.setattr(studio, "place", lambda _, bright=light: Place(np.full((*VIEW.size[::-1], 3), bright), []))
+        monkeypatch.setattr(studio, "place", lambda _, bright=light: EmptyStage(np.full((*VIEW.size[::-1], 3), bright), []))
         pictures.append(studio.take(figure, 5)[0][solid].astype(int))
     assert np.abs(np.subtract(*pictures)).max() <= 2  # the lens blurs a little
 

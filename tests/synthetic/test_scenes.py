@@ -19,14 +19,13 @@ from shadowpuppet.synthetic.compositing import FAR, Layer, composite, composite_
 from shadowpuppet.synthetic.furniture import SHAPES, Furniture
 from shadowpuppet.synthetic.movement import gestures
 from shadowpuppet.synthetic.person.clothes import Clothes
-from shadowpuppet.synthetic.person.dressed import dressed
-from shadowpuppet.synthetic.person.kinematics import SEGMENTS, Figure, pose
+from shadowpuppet.synthetic.person.kinematics import SEGMENTS, PosedBody, pose
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.person.surface import Surface, ellipsoid
 from shadowpuppet.synthetic.person_renderer import PersonRenderer, _covering
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.room import lamp_brightness
-from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
+from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body, dressed
 from shadowpuppet.synthetic.viewpoint import BODY_CENTRE, RING_JITTER, RING_SCALE_JITTER
 from shadowpuppet.video import open_frames
 
@@ -35,7 +34,7 @@ SMALL = Spec(motion=(Gesture(motion="wave_hands", seconds=2),), cameras=(VIEW,),
 LIGHTS = np.array([[0, -0.6, 0.8, 0.5], [0.6, -0.8, 0, 0.2], [0, 0, 0, 0.5]])
 
 
-def shot(spec: Spec, figure: Figure, index: int = 0, others: tuple[Figure, ...] = (), view: Viewpoint | None = None):
+def shot(spec: Spec, figure: PosedBody, index: int = 0, others: tuple[PosedBody, ...] = (), view: Viewpoint | None = None):
     """One picture of the film with everything in it."""
     studio = SceneRenderer(spec, (view or spec.views()[0]).camera(), np.random.default_rng(0), others)
     one = figure._replace(joints=figure.joints[index : index + 1], rotation=figure.rotation[index : index + 1],
@@ -43,7 +42,7 @@ def shot(spec: Spec, figure: Figure, index: int = 0, others: tuple[Figure, ...] 
     return next(studio.film(one))
 
 
-def standing(body: Mannequin | None = None, left: float = 0.0, ahead: float = 0.0, **posture: float) -> Figure:
+def standing(body: Mannequin | None = None, left: float = 0.0, ahead: float = 0.0, **posture: float) -> PosedBody:
     figure = pose(body or Mannequin(), gestures.posture(**(posture or gestures.LEVEL)))
     place = np.array([left, -ahead, 0])
     return figure._replace(joints=figure.joints + place, origin=figure.origin + place)

@@ -26,7 +26,6 @@ from shadowpuppet.synthetic import (
     Spec,
     Viewpoint,
     around,
-    humaneva,
     named_specs,
     proving_ground,
     proving_rings,
@@ -105,7 +104,7 @@ def test_a_spec_with_a_ring_comes_back(ring):
 def test_named_specs_are_theirs_by_name_and_can_be_written():
     named = named_specs()
     assert {"demo", "ring_walking", "man_reach"} <= set(named)
-    assert len(named) == 2 + len(proving_ground()) + len(around()) + len(humaneva()) + len(proving_rings()) + len(resting())
+    assert len(named) == 2 + len(proving_ground()) + len(around()) + len(proving_rings()) + len(resting())
     for name, spec in named.items():
         assert spec.name == name
         assert spec_from(tomllib.loads(spec_text(spec))) == spec
@@ -520,21 +519,3 @@ def test_training_and_bystanders_of_a_part(tmp_path):
     assert len(read_joints(folder / "truth.csv").times) == 3
     assert len(read_joints(folder / "training.csv").times) == 7
     assert len(frames(folder / "people" / "cam1.mkv")) == 3
-
-
-def test_recordings_like_humanevas_are_of_the_papers_sizes():
-    for spec, (motion, count) in zip(humaneva(), (("walk", 433), ("jog", 393), ("box", 377)), strict=True):
-        times, figure = perform(spec, np.random.default_rng(spec.seed))
-        assert [gesture.motion for gesture in spec.motion] == [motion]
-        assert (len(times), spec.training_frames, spec.rate, len(spec.views())) == (count, 100, 60.0, 7)
-        hips = figure.joints[:, :1]
-        if motion != "box":  # from the first picture to the last they go
-            assert np.linalg.norm(np.diff(hips[:, 0, :2], axis=0), axis=1).min() > 0.5 / 60
-        else:  # and hands move in every half second
-            hands = figure.joints - hips
-            assert min(np.ptp(hands[n : n + 30], axis=0).max() for n in range(0, count - 30, 10)) > 0.05
-        for view in spec.views():
-            pixels = view.camera().project(figure.joints.reshape(-1, 3))
-            assert view.size == (640, 480)
-            assert (pixels > 20).all()
-            assert (pixels < np.array(view.size) - 20).all()  # nobody is cut

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from people import camera, picture, shapes_of
 
 from shadowpuppet.camera.bits import unpack
-from shadowpuppet.camera.colour_codes import NUMBER, Codes, colour_codes, step_of, thinned
+from shadowpuppet.camera.colour_codes import NUMBER, ColourCode, colour_codes, step_of, thinned
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.tracking.arm_colours import ENOUGH, ENOUGH_REST, ArmColours, ColourCounts, distinct, kind_of
 from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
@@ -47,7 +47,7 @@ def poses_of_arms(frames: int) -> np.ndarray:
                                    right_shoulder_abduction=0.6, right_elbow_flexion=0.3) for b in before])
 
 
-def counts_of(skin: set[str], of: Picture, frames: int = 12) -> tuple[ColourCounts, list[Codes]]:
+def counts_of(skin: set[str], of: Picture, frames: int = 12) -> tuple[ColourCounts, list[ColourCode]]:
     counts, found = None, []
     for n, pose in enumerate(poses_of_arms(30)[:frames]):
         image, mask = painted(pose, of, skin, seed=n)

@@ -20,7 +20,7 @@ from waiting import LONG, until
 
 from shadowpuppet.errors import ShadowPuppetWarning, VideoError
 from shadowpuppet.video import FrameSource, network_stream, open_frames, write_image
-from shadowpuppet.video.capture import FIRST_WAIT, LONGEST_WAIT, Capture, Newest
+from shadowpuppet.video.capture import FIRST_WAIT, LONGEST_WAIT, CameraCapture, Newest
 from shadowpuppet.video.frames import Frame
 from shadowpuppet.video.live_source import Feed, Snapshot, film_feed, open_feed
 from shadowpuppet.video.network_stream import without_secrets
@@ -119,7 +119,7 @@ def test_a_film_is_held_and_a_camera_is_not():
             yield from shots
             end.wait(LONG)
 
-        capture = Capture(Feed("film", (16, 12), 10.0, live, read, said.append))
+        capture = CameraCapture(Feed("film", (16, 12), 10.0, live, read, said.append))
         capture.hold(True)
         with capture:
             until(lambda capture=capture, expected=expected: capture.newest.put_count >= expected)
@@ -268,7 +268,7 @@ def read_with_waits(capture, enough):
 
 
 def test_a_camera_that_is_gone_is_tried_again_with_longer_and_longer_waits():
-    capture = Capture(Unsteady(2, *["unplugged"] * 8).feed())
+    capture = CameraCapture(Unsteady(2, *["unplugged"] * 8).feed())
     waits = read_with_waits(capture, 8)
     assert [seconds for seconds, _ in waits[:2]] == [FIRST_WAIT, 2 * FIRST_WAIT]
     assert waits[-1] == (LONGEST_WAIT, "unplugged")
@@ -277,7 +277,7 @@ def test_a_camera_that_is_gone_is_tried_again_with_longer_and_longer_waits():
 
 def test_a_camera_that_returns_is_read_on_and_the_next_wait_is_short_again():
     camera = Unsteady(1, "gone", "gone", "gone", 3, "gone")
-    capture = Capture(camera.feed())
+    capture = CameraCapture(camera.feed())
     waits = read_with_waits(capture, 6)
     assert [seconds / FIRST_WAIT for seconds, _ in waits] == [1, 2, 4, 8, 1, 2]
     assert capture.newest.put_count == 4
@@ -285,7 +285,7 @@ def test_a_camera_that_returns_is_read_on_and_the_next_wait_is_short_again():
 
 
 def test_a_film_that_is_over_is_over():
-    with Capture(Unsteady(3).feed(live=False)) as capture:
+    with CameraCapture(Unsteady(3).feed(live=False)) as capture:
         until(lambda: capture.ended)
         shot = capture.newest.take()
     assert shot is not None
@@ -299,7 +299,7 @@ def test_who_waits_for_a_picture_of_a_film_that_ends_waits_no_longer():
         end.wait(LONG)
         yield from ()
 
-    with Capture(Feed("film", (16, 12), math.nan, False, read)) as capture:
+    with CameraCapture(Feed("film", (16, 12), math.nan, False, read)) as capture:
         waiting = threading.Thread(target=capture.newest.take, args=(3 * LONG,), daemon=True)
         waiting.start()
         until(lambda: capture.newest._changed._waiters)
@@ -309,7 +309,7 @@ def test_who_waits_for_a_picture_of_a_film_that_ends_waits_no_longer():
 
 
 def test_a_film_that_breaks_ends_with_its_error():
-    with Capture(Unsteady("a hole").feed(live=False)) as capture:
+    with CameraCapture(Unsteady("a hole").feed(live=False)) as capture:
         until(lambda: capture.ended)
     assert str(capture.error) == "a hole"
 
@@ -319,7 +319,7 @@ def test_what_is_no_fault_of_the_camera_is_not_hidden():
         raise RuntimeError("a bug")
         yield
 
-    with Capture(Feed("cam", (16, 12), math.nan, True, read)) as capture:
+    with CameraCapture(Feed("cam", (16, 12), math.nan, True, read)) as capture:
         until(lambda: capture.ended)
     assert isinstance(capture.error, RuntimeError)
 
@@ -333,7 +333,7 @@ def test_a_frozen_camera_is_opened_again_at_once_when_asked():
             time.sleep(0.002)
             yield Snapshot(0.0, GREY)
 
-    with Capture(Feed("cam", (16, 12), math.nan, True, read)) as capture:
+    with CameraCapture(Feed("cam", (16, 12), math.nan, True, read)) as capture:
         until(lambda: capture.newest.put_count > 2)
         capture.again()
         until(lambda: len(opened) == 2)
@@ -387,7 +387,7 @@ def test_a_network_camera_is_read_as_it_comes_and_taken_up_again(camera_server):
     feed = open_feed(address)
     assert (feed.size, feed.live, feed.name) == ((64, 48), True, address)
     seen = set()
-    with Capture(feed) as capture:
+    with CameraCapture(feed) as capture:
         def enough() -> bool:
             shot = capture.newest.take(0.1)
             if shot is not None:
@@ -404,7 +404,7 @@ def test_a_stream_that_stalls_is_said_and_not_waited_for_forever(camera_server, 
     monkeypatch.setattr(network_stream, "READ_SECONDS", 0.4)
     _, handler, address = camera_server
     handler.stall = 30.0
-    with Capture(open_feed(address)) as capture:
+    with CameraCapture(open_feed(address)) as capture:
         until(lambda: "the stream broke off (it does not answer)" in capture.problem)
         until(lambda: capture.problem == "")  # tried again
 

@@ -111,9 +111,10 @@ def test_a_folder_that_says_nothing_of_time_is_taken_at_30_frames_with_a_warning
 @pytest.mark.parametrize(("name", "line", "heading"), [
     ("timestamps.txt", "{}", ""), ("timestamps.csv", "{},{}.png", "time,picture\n"), ("timestamps.txt", "{}\t7", "# seconds\n"),
 ])
-def test_a_folder_s_times_are_read(folder, name, line, heading):
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_a_folder_s_times_are_read(folder, name, line, heading, encoding):
     stamps = 1_700_000_000 + np.arange(12) ** 2 / 8
-    (folder / name).write_text(heading + "\n".join(line.format(t, i) for i, t in enumerate(stamps.tolist())) + "\n\n")
+    (folder / name).write_text(heading + "\n".join(line.format(t, i) for i, t in enumerate(stamps.tolist())) + "\n\n", encoding)
     source = open_frames(folder, grey=True)
     assert [frame.time for frame in source] == (np.arange(12) ** 2 / 8).tolist()
     assert source.rate == 11 / (11**2 / 8)

@@ -18,7 +18,7 @@ import made
 import numpy as np
 import pytest
 
-from shadowpuppet.live.display.view import View
+from shadowpuppet.live.display.view import SessionState
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
@@ -276,7 +276,7 @@ def test_a_live_session_is_shown_in_space_and_its_buttons_are_commands(browser, 
     first, again = Picture(body, camera, T), Picture(body, camera, T)
     image = np.full((*camera.size[::-1], 3), 90, np.uint8)
     with SpaceDisplay(port=0, footer="No picture is kept.") as display, page_of(browser, display.address, live=True) as page:
-        display.show(View(phase="learning", message="step out of the picture", countdown=3.0, image=image))
+        display.show(SessionState(phase="learning", message="step out of the picture", countdown=3.0, image=image))
         page.wait(lambda: "step out of the picture" in page.page.inner_text("body"), "what to do is said")
         assert page.page.locator("#scene").is_hidden()
 
@@ -284,7 +284,7 @@ def test_a_live_session_is_shown_in_space_and_its_buttons_are_commands(browser, 
             pose = motion.poses[n]
             view = {"phase": "tracking", "status": "tracked", "overlap": 0.91, "image": image, "mask": picture.mask(pose), "latency": 0.02,
                     "rate": 8.0, "picture": picture, "pictures": (picture,), "pose": pose}  # fmt: skip
-            display.show(View(**view | more))
+            display.show(SessionState(**view | more))
             return True
 
         def green():

@@ -13,7 +13,7 @@ import people
 import pytest
 
 from shadowpuppet.geometry import inverse, rigid, rotation_about
-from shadowpuppet.live.display.view import View
+from shadowpuppet.live.display.view import SessionState
 from shadowpuppet.motion.limbs import LIMBS
 from shadowpuppet.viewer.web.frustum_images import Undistorter
 from shadowpuppet.viewer.web.live import WIDTH, SpaceDisplay
@@ -31,7 +31,7 @@ def tracked(picture, **more):
     pose = np.zeros(len(picture.body.skeleton.dofs))
     known = {"phase": "tracking", "status": "tracked", "image": ROOM, "mask": picture.mask(pose), "picture": picture,
              "pictures": (picture,), "pose": pose}
-    return View(**known | more)
+    return SessionState(**known | more)
 
 
 def ask(page, path, **headers):
@@ -46,7 +46,7 @@ def unpacked(packed):
 
 
 def test_the_space_begins_when_the_person_is_measured(page):
-    view = View(phase="waiting", image=ROOM)
+    view = SessionState(phase="waiting", image=ROOM)
     page.show(view)
     assert "space" not in page.figures(view)
     assert [ask(page, path)[0] for path in ("/space.json", "/space.jpg", "/space.html")] == [404, 404, 404]
@@ -115,7 +115,7 @@ def test_the_image_in_space_is_undistorted_with_the_outline_and_without_the_body
 def test_several_cameras_stand_in_space_without_images(page):
     cams = (people.camera(), people.camera(focal=1.2))
     pictures = tuple(people.picture("rounded", cam) for cam in cams)
-    view = View(phase="tracking", image=ROOM, pictures=pictures, pose=np.zeros(len(pictures[0].body.skeleton.dofs)))
+    view = SessionState(phase="tracking", image=ROOM, pictures=pictures, pose=np.zeros(len(pictures[0].body.skeleton.dofs)))
     page.show(view)
     assert page.figures(view)["puppet"] is not None
     scene = json.loads(ask(page, "/space.json")[2])

@@ -35,16 +35,15 @@ from shadowpuppet.motion.motion import STATUSES, JointTable
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.viewer.scene.colours import mesh_colours
 from shadowpuppet.viewer.scene.figures import animation_figure, joint_figure, pose_figure
 from shadowpuppet.viewer.scene.film_images import hull_function
 from shadowpuppet.viewer.scene.of_prior import body_of as body_of_prior
 from shadowpuppet.viewer.scene.of_prior import prior_scene, sampled_motion, stationary_shares
 from shadowpuppet.viewer.scene.of_run import side_by_side
 from shadowpuppet.viewer.scene.open_any import cut_scene, open_scene
-from shadowpuppet.viewer.scene.scene import Figure, Scene, SceneCamera
+from shadowpuppet.viewer.scene.scene import SceneCamera, SceneFigure, Stage
 from shadowpuppet.viewer.scene.strip import doubtful_moments, nearest_frames, strips_of
-from shadowpuppet.viewer.web.content import motion_content, page_text
+from shadowpuppet.viewer.web.content import mesh_colours, motion_content, page_text
 from shadowpuppet.viewer.web.frustum_images import Undistorter, camera_image
 from shadowpuppet.viewer.web.page import kept_frames, write_page
 from shadowpuppet.viewer.web.serve import ScenePage, serving
@@ -67,7 +66,7 @@ def tracked(tmp_path_factory):
     return folder / "run"
 
 
-def skinned(figure: Figure, n: int) -> np.ndarray:
+def skinned(figure: SceneFigure, n: int) -> np.ndarray:
     """The mesh's points (V, 3) in a frame, as a page moves them."""
     mesh, x, y, z, w = figure.mesh, *(figure.quaternions[n][figure.mesh.joints].T[k] for k in (1, 2, 3, 0))
     R = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -436,7 +435,7 @@ def test_markers_of_unknown_names_are_shown_all(tmp_path, rng):
 
 
 def test_a_part_of_a_show():
-    scene = Scene(title="a", times=np.arange(50) / 10)
+    scene = Stage(title="a", times=np.arange(50) / 10)
     assert cut_scene(scene, 1.0, 2.0).times == pytest.approx(np.arange(10, 21) / 10)
     assert len(cut_scene(scene, None, None).times) == 50
     with pytest.raises(ShadowPuppetError, match="a part of"):
@@ -512,7 +511,7 @@ def test_a_truth_with_bones_is_lines(tracked):
 
 
 def test_what_a_page_may_fetch_and_texts_of_others_cannot_be_script():
-    scene = Scene(title="</script><b>run</b>", times=np.zeros(1), facts={"a": "</script><script>alert(1)</script>"})
+    scene = Stage(title="</script><b>run</b>", times=np.zeros(1), facts={"a": "</script><script>alert(1)</script>"})
     alone, served = page_text(scene, [], [], False), page_text(scene, [], None, False)
     for page in (alone, served):
         assert "<b>" not in page
@@ -527,7 +526,7 @@ def test_what_a_page_may_fetch_and_texts_of_others_cannot_be_script():
 
 @pytest.mark.parametrize("name", ["@SCRIPT@", "@DATA@", "@POLICY@", "@STYLE@", "@TITLE@", r"\g<1> \1 @NONE@"])
 def test_names_that_look_like_places_of_the_template_stay_names(name):
-    usual, page = (page_text(Scene(title=each, times=np.zeros(1), facts={"camera": each}), [], [], False) for each in ("walk-on", name))
+    usual, page = (page_text(Stage(title=each, times=np.zeros(1), facts={"camera": each}), [], [], False) for each in ("walk-on", name))
     told = content(page)
     for written in (json.dumps(name)[1:-1].replace("<", "\\u003c"), name, escape(name)):
         page = page.replace(written, "walk-on")

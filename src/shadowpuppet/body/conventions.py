@@ -29,7 +29,7 @@ turns in another order, and its spine and pelvis have no rotation vectors."""
 
 
 class Convention(NamedTuple):
-    """What a degree of freedom means."""
+    """Meaning of a degree of freedom."""
 
     dof: Dof
     parent: str
@@ -44,9 +44,9 @@ class Convention(NamedTuple):
     bent: str
     """The degree of freedom that is at `BEND` meanwhile; empty for none."""
     lies: str
-    """Where that point lies from the joint at zero, such as `below`, across the axis; empty for a translation."""
+    """Direction of that point from the joint at zero, such as `below`, across the axis; empty for a translation."""
     moves: str
-    """Where it moves as the value grows, such as `forward`."""
+    """Direction of its movement as the value grows, such as `forward`."""
     isb: tuple[str, int]
     """Name of the angle in ISB's recommendations, and our sign of it; empty and 0 if there is none."""
 
@@ -102,7 +102,7 @@ def _way(body: Body, pose: Array, d: int, names: list[str]) -> Array:
 
 
 def _carried(body: Body, joint: str) -> list[str]:
-    """Landmarks that move with a joint; without those that no file has."""
+    """Landmarks that move with a joint and stand in files."""
     below = {joint}
     for each in body.skeleton.joints:
         if each.parent in below:

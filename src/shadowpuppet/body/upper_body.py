@@ -102,7 +102,7 @@ def _landmarks(sizes: CardboxSizes) -> dict[str, tuple[str, tuple[float, float, 
 
 
 @dataclass(frozen=True)
-class _Part:
+class _Card:
     """A body part as a frustum along Z: widths (Y) and depths (X) at its top and bottom."""
 
     name: str
@@ -135,17 +135,17 @@ class _Part:
         return [*sides, self.level_card(0.0), self.level_card(1.0)]
 
 
-def _parts(sizes: CardboxSizes) -> list[_Part]:
+def _parts(sizes: CardboxSizes) -> list[_Card]:
     s, neck = sizes, sizes.torso_height + sizes.neck_gap
     parts = [
-        _Part("head", "torso", neck + s.head_height, neck, (s.head_width, s.head_width), (s.head_depth, s.head_depth)),
-        _Part("torso", "torso", s.torso_height, 0.0, (s.shoulder_width, s.torso_bottom_width), (s.torso_top_depth, s.torso_bottom_depth)),
-        _Part("waist", "pelvis", 0.0, -s.waist_height, (s.waist_width, s.waist_width), (s.waist_depth, s.waist_depth)),
+        _Card("head", "torso", neck + s.head_height, neck, (s.head_width, s.head_width), (s.head_depth, s.head_depth)),
+        _Card("torso", "torso", s.torso_height, 0.0, (s.shoulder_width, s.torso_bottom_width), (s.torso_top_depth, s.torso_bottom_depth)),
+        _Card("waist", "pelvis", 0.0, -s.waist_height, (s.waist_width, s.waist_width), (s.waist_depth, s.waist_depth)),
     ]
     upper, lower = (s.upper_arm_width, s.upper_arm_width), (s.elbow_width, s.hand_width)
     for side in SIDES:
-        parts += [_Part(f"{side}_upper_arm", f"{side}_shoulder", 0.0, -s.upper_arm_length, upper, upper),
-                  _Part(f"{side}_forearm", f"{side}_elbow", 0.0, -s.forearm_length, lower, lower)]
+        parts += [_Card(f"{side}_upper_arm", f"{side}_shoulder", 0.0, -s.upper_arm_length, upper, upper),
+                  _Card(f"{side}_forearm", f"{side}_elbow", 0.0, -s.forearm_length, lower, lower)]
     return parts
 
 

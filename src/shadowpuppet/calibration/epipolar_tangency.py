@@ -13,7 +13,7 @@ import numpy as np
 
 from shadowpuppet.calibration.silhouettes import Outline, Row, outlines_of
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, unit
 
 MAX_ANGULAR_EXTENT = 2.6
 """Greatest angle (rad) of a silhouette about the baseline: beyond it, the baseline runs through or along the person."""
@@ -56,8 +56,8 @@ def tangent_angles(cameras: tuple[Camera, Camera], outlines: tuple[Outline, Outl
     line = line / length
     aside = [outline.rays - (outline.rays @ line)[:, None] * line for outline in outlines]
     if reference is None:
-        ahead = _unit(aside[0].sum(0)) + _unit(aside[1].sum(0))
-        reference = _unit(ahead if np.linalg.norm(ahead) > 1e-6 else aside[0].sum(0))
+        ahead = unit(aside[0].sum(0)) + unit(aside[1].sum(0))
+        reference = unit(ahead if np.linalg.norm(ahead) > 1e-6 else aside[0].sum(0))
     angles = [np.arctan2(part @ np.cross(line, reference), part @ reference) for part in aside]
     if max(float(np.ptp(each)) for each in angles) > MAX_ANGULAR_EXTENT:
         return None
@@ -77,7 +77,3 @@ def _apart(first: Camera, a: Outline, second: Camera, b: Outline) -> tuple[float
         return np.nan, np.nan
     low, high = np.abs(found.angles[0] - found.angles[1]) * found.levers
     return float(low), float(high)
-
-
-def _unit(vector: Array) -> Array:
-    return vector / max(float(np.linalg.norm(vector)), 1e-12)

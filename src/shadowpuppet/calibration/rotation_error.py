@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shadowpuppet.calibration.clock_offset import QUANTILE
-from shadowpuppet.calibration.epipolar_tangency import tangent_angles
-from shadowpuppet.calibration.silhouettes import Outline, Row, outlines_of
-from shadowpuppet.calibration.solve.tangency_bundle import place_by_outlines
+from shadowpuppet.calibration.silhouettes import Row
+from shadowpuppet.calibration.solve.tangency_bundle import hulls_of, pairs_of, place_by_outlines, signed_distances
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
@@ -73,21 +72,17 @@ def estimate_rotation_error(cameras: Sequence[Camera], rows: Sequence[Row], n: i
     """
     from scipy.optimize import least_squares
 
-    outlines = [outlines_of(cameras, row) for row in rows]
-    others = [k for k in range(len(cameras)) if k != n and any(row[n] is not None and row[k] is not None for row in outlines)]
-    if len(others) < 2:
+    hulls = [hulls_of(camera, [row[k] for row in rows]) for k, camera in enumerate(cameras)]
+    pairs = [pair for pair in pairs_of(hulls) if n in pair[:2]]
+    if len(pairs) < 2:
         return None
 
     def distances(vector: Array) -> Array:
-        """Of tangents by set, other camera and side, of shape (F, K, 2), pixels."""
-        camera, values = _rotated(cameras[n], vector), np.full((len(outlines), len(others), 2), np.nan)
-        for f, row in enumerate(outlines):
-            for at, k in enumerate(others):
-                own, other, found = row[n], row[k], None
-                if own is not None and other is not None:
-                    found = tangent_angles((camera, cameras[k]), (_rotated_outline(own, cameras[n], camera), other))
-                if found is not None:
-                    values[f, at] = (found.angles[0] - found.angles[1]) * found.levers
+        """Of tangents by set, pair of cameras and side, of shape (F, K, 2), pixels."""
+        turned = [_rotated(camera, vector) if k == n else camera for k, camera in enumerate(cameras)]
+        values = np.full((len(rows), len(pairs), 2), np.nan)
+        for k, pair in enumerate(pairs):
+            values[pair.sets, k] = signed_distances(turned, hulls, pair)
         return values
 
     start = distances(np.zeros(3))
@@ -145,11 +140,6 @@ def _error_of(turn: Array, moved: Array, before: float, after: float, widths: Ar
     (x, y, z), (dx, dy, dz), (by_x, by_y, by_z) = np.degrees(turn).tolist(), moved.tolist(), np.degrees(widths).tolist()
     return RotationError(right=-y, down=x, clockwise=-z, spread=(by_y, by_x, by_z), moved=(dx, dy, dz), before=float(before),
                          after=float(after))
-
-
-def _rotated_outline(outline: Outline, before: Camera, after: Camera) -> Outline:
-    """The outline with its rays rotated from the camera `before` to `after`."""
-    return outline._replace(rays=outline.rays @ before.T_camera_world[:3, :3].T @ after.T_camera_world[:3, :3])
 
 
 def _rotated(camera: Camera, vector: Array) -> Camera:

@@ -6,7 +6,7 @@ films begun together of the board carried through the room; LAB/floor/CAMERA.jpg
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -129,6 +129,7 @@ def calibrate(session: Session, lenses: Mapping[str, Camera] | None = None, say:
     advice += [f"{fit.camera.name!r}: {_bad_fit(fit)}" for fit in fits.values() if _bad_fit(fit)]
     notes = [f"camera {name!r}: lens from the film of the carried board, as intrinsics/ has none of it"
              for name in fits if name not in single]
+    notes += _print_notes([*single.items(), *carried.items(), *laid.items()])
     if not carried and not laid:
         return Calibrated(session=session, cameras=tuple(cameras), lenses=tuple(fits.get(name) for name in names), placement=None,
                           advice=tuple(advice), notes=(*notes, "lenses only: there are no films in extrinsics/ or floor/"))
@@ -156,6 +157,12 @@ def _lens(name: str, board: Board, films: Sequence[BoardFilm]) -> LensFit:
     for film in films[1:] if len(views) < 20 else []:
         views = views + film.found
     return solve_lens(name, board, views, films[0].size)
+
+
+def _print_notes(films: Iterable[tuple[str, BoardFilm]]) -> list[str]:
+    """A sentence if the board of some cameras' films is printed inverted."""
+    names = sorted({name for name, film in films if any(view.inverted for view in film.found)})
+    return [f"the board is printed inverted, black and white exchanged: found so by {', '.join(names)}"] if names else []
 
 
 def _known_lens(camera: Camera, name: str, films: Sequence[BoardFilm]) -> Camera:

@@ -7,7 +7,7 @@ little changes its signal by a nearly constant angle, which is removed: this sep
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -45,6 +45,9 @@ LONE_PAIR = 2.0
 wrong in all of the film, as those of a man who balances, whose arms and trunk sway apart."""
 FAR = 3.0
 """Residuals count up to this many standard deviations: a limb that one silhouette lacks."""
+MIN_OFFSET, MIN_OFFSET_MISPLACED, SPREAD_FACTOR = 0.5, 1.5, 1.5
+"""Least offset, in sets, of a film that is late; the same for a camera that disagrees about places, so that its time is less certain;
+least ratio of the offset to the half-width of its 90 % interval."""
 SOLVER_ROUNDS = 30
 """Rounds of iteratively reweighted least squares for all cameras."""
 
@@ -88,6 +91,18 @@ def time_offsets(cameras: Sequence[Camera], rows: Sequence[Row]) -> TimeOffsets:
         table[j, i] = -table[i, j]
     return TimeOffsets(names=tuple(camera.name for camera in cameras), frames=plain_values(late), spread=plain_values(spread),
                        pairs=tuple(map(plain_values, table)))
+
+
+def certain_offsets(offsets: TimeOffsets, misplaced: Collection[str] = ()) -> list[float]:
+    """Certain time offsets of the films, in sets; 0 for uncertain ones. `misplaced`: names of cameras that disagree about places."""
+    limits = [max(MIN_OFFSET_MISPLACED if name in misplaced else MIN_OFFSET, SPREAD_FACTOR * (spread or 0.0))
+              for name, spread in zip(offsets.names, offsets.spread)]
+    return [late if late is not None and abs(late) > limit else 0.0 for late, limit in zip(offsets.frames, limits)]
+
+
+def delays_in_words(frames: Mapping[str, float]) -> str:
+    """By how many frames each film is late, by camera."""
+    return ", ".join(f"{name} {abs(value):.1f} frames {'late' if value > 0 else 'early'}" for name, value in frames.items())
 
 
 def tangent_signals(cameras: Sequence[Camera], outlines: Sequence[Sequence[Outline | None]], i: int, j: int) -> Array:
@@ -230,14 +245,10 @@ def _solved(count: int, shifts: Sequence[_Shift]) -> tuple[Array, Array]:
 
 def _linked(count: int, shifts: Sequence[_Shift]) -> tuple[list[int], list[_Shift]]:
     """The largest group of films whose offsets can be compared, in order, and the shifts between them."""
-    others = {n: {shift.first + shift.second - n for shift in shifts if n in shift[:2]} for n in range(count)}
-    group = max((_reached(n, others) for n in range(count) if others[n]), key=len, default=set())
-    return sorted(group), [shift for shift in shifts if shift.first in group]
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
 
-
-def _reached(film: int, others: Mapping[int, set[int]]) -> set[int]:
-    group, edge = {film}, {film}
-    while edge:
-        edge = {other for n in edge for other in others[n]} - group
-        group |= edge
-    return group
+    links = csr_array((np.ones(len(shifts)), np.array([shift[:2] for shift in shifts], int).reshape(-1, 2).T), shape=(count, count))
+    _, number = connected_components(links, directed=False)
+    group = np.flatnonzero(number == np.bincount(number).argmax()).tolist()
+    return group, [shift for shift in shifts if shift.first in group]

@@ -1,1 +1,1 @@
-"""How a camera sees a body: projection, rasterised silhouettes, masks, drawing."""
+"""A body as a camera sees it: projection, rasterised silhouettes, masks, drawing."""

@@ -12,7 +12,7 @@ NUMBER = LEVELS**3
 ENOUGH = 320 * 240
 """Number of pixels that say enough about colours; in larger pictures some are left out."""
 
-Codes = NDArray[np.uint16]
+ColourCode = NDArray[np.uint16]
 """Colours, 0 to `NUMBER` - 1, of the pixels that `thinned` leaves."""
 
 
@@ -27,7 +27,7 @@ def thinned(pixels: NDArray) -> NDArray:
     return np.ascontiguousarray(pixels[::step, ::step])
 
 
-def colour_codes(image: NDArray[np.uint8] | None) -> Codes | None:
+def colour_codes(image: NDArray[np.uint8] | None) -> ColourCode | None:
     """The colours of an image (H, W, 3) or (H, W); None for None."""
     if image is None:
         return None

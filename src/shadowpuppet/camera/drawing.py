@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.body.bones import BONES
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, transform
 
@@ -25,7 +25,7 @@ SIDE_COLOURS = {"left": (115, 158, 0), "right": (167, 121, 204)}
 MIDDLE_COLOUR = (66, 228, 240)
 """The colour of parts that are neither left nor right."""
 PALE, PALENESS = (190, 190, 190), 0.7
-"""The colour mixed into that of a limb that is not vouched for, and its share."""
+"""The colour mixed into a doubtful limb's, and its share."""
 DASH = 8
 """Length of the dashes and gaps of such a limb's bones, in pictures 240 pixels high, pixels."""
 MATCHING = np.array([BLACK, MODEL_ONLY, SILHOUETTE_ONLY, WHITE, (40, 40, 40), (40, 40, 40), GREY, GREY], np.uint8)
@@ -43,7 +43,7 @@ def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLi
     Top: the model over the darkened picture, cards brighter the more they face the camera. Middle: where model and silhouette `mask` (H,
     W) agree (white) or differ, and ignored pixels, `ignore` (H, W), in greys. Bottom: the picture with the skeleton, the time (s),
     the status and the overlap. Shapes and bones whose names are `doubtful` are pale, and the bones dashed. Where the `pose` (D,) is not
-    finite, the skeleton is that of the `last` pose that was, of a time (s), all pale. Raises `ShadowPuppetError` for a picture that is
+    finite, the skeleton has the `last` finite pose, of a time (s), all pale. Raises `ShadowPuppetError` for a picture that is
     not of the camera's size.
     """
     image, pose, mask = in_colour(image), np.asarray(pose, float), np.asarray(mask, bool)
@@ -223,7 +223,7 @@ def _point(pixel: Array) -> tuple[int, int]:
 
 
 LEGEND = (("left", SIDE_COLOURS["left"]), ("right", SIDE_COLOURS["right"]), ("pale: doubtful", PALE))
-"""What the model's colours are."""
+"""The model's colours."""
 
 
 def _label(out: Image, height: int, status: str, time: float, overlap: float, ignores: bool) -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.camera.colour_codes import Codes
+from shadowpuppet.camera.colour_codes import ColourCode
 from shadowpuppet.errors import TrackingError
 
 Mask = NDArray[np.bool_]
@@ -26,7 +26,7 @@ class Seen(NamedTuple):
     """Silhouettes (H, W)."""
     shadows: tuple[Mask | None, ...] = ()
     """Pixels (H / 2, W / 2) that were taken for shadow; empty: not known."""
-    codes: tuple[Codes | None, ...] = ()
+    codes: tuple[ColourCode | None, ...] = ()
     """Coarse colours (`camera.colour_codes`) in the light of the empty scene; empty: not known."""
     own: tuple[Mask | None, ...] = ()
     """Silhouettes (H, W) as each camera's own picture has them; empty where other cameras have added nothing to `masks`."""

@@ -51,7 +51,7 @@ class Examined:
     """`missing`: absent, but not needed to track films."""
     told: str
     remedy: str = ""
-    """How to repair it; may be empty."""
+    """Repair; may be empty."""
     needed: bool = False
     """Whether tracking is impossible without it."""
 
@@ -258,7 +258,7 @@ def _extras() -> Iterator[Examined]:
 
 
 def _external_masks() -> Iterator[Examined]:
-    """What runs the scripts of `masks`."""
+    """Check the program that runs the scripts of `masks`."""
     from shadowpuppet.silhouette.external.environment import cache_folder, uv_path
 
     uv = uv_path()

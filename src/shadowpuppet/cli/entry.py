@@ -42,7 +42,7 @@ def _handle_signals(heard: list[int]) -> None:
             signal.signal(each, signal.SIG_IGN)  # files are being completed
         heard.append(number)
         for stream in (1, 2):
-            if number != signal.SIGTERM and os.isatty(stream):  # the terminal is gone: what is printed to it would fail
+            if number != signal.SIGTERM and os.isatty(stream):  # the terminal is gone: printing to it would fail
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
         raise KeyboardInterrupt
 

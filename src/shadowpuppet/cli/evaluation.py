@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -28,7 +28,7 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     truth
         Joints to compare with: .csv, .trc, .c3d, .bvh, .amc, .npz or .parquet. [default: the recording's truth]
     joints
-        Joints to compare, separated by commas; or upper, limbs, or humaneva (its 15). [default: upper; limbs where there are legs]
+        Joints to compare, separated by commas; or upper, or limbs. [default: upper; limbs where there are legs]
     start
         First frame of the truth to compare: its number (120 or 120f), or its time (3.5s).
     end
@@ -56,7 +56,8 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
     if movement is not None:
         check_output(movement, run, ".csv")
     if person_folders(run):
-        return _of_people(run, truth, file, report, movement, update, quiet, as_json)
+        of_one = {"TRUTH": truth, "--report": report, "--movement": movement, "--update": update}
+        return _of_people(run, file, [name for name, given in of_one.items() if given], quiet, as_json)
     written = {}
     with terminal(quiet or as_json) as listener:
         listener.begin("measuring")
@@ -79,17 +80,15 @@ def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = No
         show(*_tables(found.measured), pairs([*_rows(found.measured), *((name, str(path)) for name, path in written.items())]))
 
 
-def _of_people(run: Path, truth: Path | None, file: Path | None, report: Path | None, movement: Path | None, update: bool, quiet: bool,
-               as_json: bool) -> None:
-    """Evaluate a run of several people."""
+def _of_people(run: Path, file: Path | None, refused: Sequence[str], quiet: bool, as_json: bool) -> None:
+    """Evaluate a run of several people; `refused`: given flags that need the run of one person."""
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.errors import SettingsError
     from shadowpuppet.evaluation.evaluation import write_evaluation
     from shadowpuppet.evaluation.people import measure_people
 
-    if wrong := next((name for name, given in (("TRUTH", truth), ("--report", report), ("--movement", movement),
-                                                  ("--update", update)) if given), None):
-        raise SettingsError(f"{wrong}: found it for a run of several people, expected it for one of them, such as {run / 'person-1'}")
+    if refused:
+        raise SettingsError(f"{refused[0]}: found it for a run of several people, expected it for one of them, such as {run / 'person-1'}")
     with terminal(quiet or as_json) as listener:
         listener.begin("measuring")
         measured = measure_people(run)
@@ -154,8 +153,6 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str | list[str]]]:
         yield "world", world_text(measured["world"])
     if axes := measured["axes_mm"]:
         yield "axes", ", ".join(f"{x} {axes[x]['mean']:+.1f} (rmse {axes[x]['rmse']:.1f})" for x in "xyz") + " mm, run less truth"
-    if "mean_mm" in (human := measured["humaneva"]):
-        yield "HumanEva", f"{human['mean_mm']:.1f} mm (sd {human['sd_mm']:.1f}) over its 15 joints"
     if measured["bends_deg"]:
         yield "bends", ", ".join(f"{joint} {value['rmse']:.1f}" for joint, value in measured["bends_deg"].items()) + " degrees (rmse)"
     if moves := measured["acceleration"]:

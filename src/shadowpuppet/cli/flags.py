@@ -20,7 +20,7 @@ RUN, PERSON, CAMERAS, SCENE, PICTURES, LIVE, PROGRAMS, LEARNING, OTHER = (Group(
 """Headings of `--help`."""
 GROUPS = {
     **dict.fromkeys(("preset", "seed", "smooth", "cutoff", "gaps", "overlay", "anyway"), RUN),
-    **dict.fromkeys(("height", "distance", "facing", "body", "person", "prior", "appearance"), PERSON),
+    **dict.fromkeys(("height", "distance", "facing", "body", "person", "prior", "people", "appearance"), PERSON),
     **dict.fromkeys(("rate", "delay", "speed", "countdown", "learn", "still", "show", "listen", "port", "lag", "record"), LIVE),
     **dict.fromkeys(("osc", "websocket", "origin", "lsl", "lsl_scope"), PROGRAMS),
     **dict.fromkeys(("fov", "calibration", "camera", "background", "masks", "label", "region", "start", "end", "max_size", "every"),
@@ -50,7 +50,7 @@ Config = Annotated[Path | None, flag("Settings file, TOML, as `shadowpuppet sett
 Quiet = Annotated[bool, switch("Show only warnings and errors.", OTHER)]
 Verbose = Annotated[bool, switch("Show all that was found, and all warnings.", OTHER)]
 AsJson = Annotated[bool, switch("Print JSON.", OTHER, "--json")]
-Recording = Annotated[Path, Parameter(help="Folder with video/, calibration.toml, ...; a project of Pose2Sim, FreeMoCap or OpenCap; "
+RecordingPath = Annotated[Path, Parameter(help="Folder with video/, calibration.toml, ...; a project of Pose2Sim, FreeMoCap or OpenCap; "
                                            "or a film or folder of pictures (then with --fov).")]
 
 

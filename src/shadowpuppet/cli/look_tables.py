@@ -35,7 +35,7 @@ def _camera_table(look: Look) -> RenderableType:
 
 
 def _told_by(key: str) -> str:
-    """By what persons are told from the scene, and why by that; `both` is a method's name."""
+    """The feature that separates persons from the scene, and the reason for its choice; `both` is a method's name."""
     return key.replace("both", "both brightness and colour", 1) if key.startswith("both") else key
 
 
@@ -96,7 +96,7 @@ def _rig_table(look: RigLook) -> RenderableType:
 
 
 def _background(camera: CameraLook) -> str:
-    """Where the silhouettes come from, the same for cameras that differ by name only; one named `a` is not every a of the text."""
+    """Source of the silhouettes, the same for cameras that differ by name only; one named `a` is not every a of the text."""
     return re.sub(rf"(?<!\w){re.escape(camera.name)}(?!\w)", "<camera>", camera.background)
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SENSES = {"uncertain": " (the outline fits badly)", "predicted": " (bridged or unseen)", "lost": " (nothing fits)",
           "absent": " (nobody in the picture)"}
-"""What a frame's status says, beside it in a table; `tracked` needs no words."""
+"""Meaning of a frame's status, beside it in a table; `tracked` needs no words."""
 ANY_WIDTH = 10_000
 """Columns that are more than any table needs."""
 
@@ -74,7 +74,7 @@ def show_next(*commands: str) -> None:
 
 def show_json(value: Any) -> None:
     """Print a value as JSON; control characters in names are escaped."""
-    from shadowpuppet.pipeline.track import json_text
+    from shadowpuppet.io.files.plain import json_text
 
     say_text("".join(sign if sign.isprintable() or sign == "\n" else json.dumps(sign)[1:-1] for sign in json_text(value)))
 

@@ -17,9 +17,10 @@ from rich.text import Text
 from shadowpuppet.cli.look_tables import look_table
 from shadowpuppet.cli.tables import PlainConsole, show, verdict_table
 from shadowpuppet.errors import ShadowPuppetWarning, printable
-from shadowpuppet.live.display.listener import LiveListener
+from shadowpuppet.live.display.view import LiveListener
 from shadowpuppet.pipeline.findings.look import Look, RigLook
 from shadowpuppet.pipeline.findings.verdict import verdict_of_look
+from shadowpuppet.video.film import NOT_LATER
 
 LOG_EVERY = 2.0
 """Seconds between lines of progress where there is no terminal."""
@@ -46,7 +47,7 @@ class LogLines:
             self._printer.start()
 
     def stop(self) -> None:
-        """Print no more, until the next start. A line that is being printed is finished: it may not fall into what is printed next."""
+        """Print no more, until the next start. A line that is being printed is finished first, so that it does not fall into the next."""
         if self._end is not None and self._printer is not None:
             self._end.set()
             self._printer.join()
@@ -58,7 +59,7 @@ class LogLines:
 
 
 class _Log(LogLines):
-    """What is being done, every `LOG_EVERY` seconds."""
+    """The current work, every `LOG_EVERY` seconds."""
 
     def __init__(self, console: PlainConsole) -> None:
         super().__init__(console, self._text, lambda: LOG_EVERY)
@@ -87,7 +88,7 @@ def _compiling() -> str:
 
 
 class _What(TextColumn):
-    """What is being done, and that code is being compiled for it."""
+    """The current work, and that code is being compiled for it."""
 
     def render(self, task: Task) -> Text:
         """The text at each refresh."""
@@ -146,10 +147,11 @@ class Terminal(LiveListener):
             self.warn(doubt)
 
     def warn(self, message: str) -> None:
-        """Print a warning on one line, once."""
+        """Print a warning on one line, once; frames that are not later than those before, once for all films."""
         line = printable(f"warning: {' '.join(message.split())}")
-        if line not in self._said:
-            self._said.add(line)
+        said = NOT_LATER if NOT_LATER in line else line
+        if said not in self._said:
+            self._said.add(said)
             self.console.print(line, soft_wrap=True)
 
     def note(self, message: str) -> None:

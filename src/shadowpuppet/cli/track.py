@@ -14,7 +14,7 @@ from shadowpuppet.cli.flags import (
     LookFlags,
     OutletFlags,
     Quiet,
-    Recording,
+    RecordingPath,
     RunFlags,
     Switch,
     Verbose,
@@ -38,7 +38,8 @@ if TYPE_CHECKING:
 
     DemoFlags = SessionFlags = LiveFlags = Any
 else:
-    KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "start", "end", "max_size", "every", "overlay", "appearance")
+    KNOWN = (*PATHS, "height", "distance", "fov", "camera", "region", "start", "end", "max_size", "every", "overlay", "people",
+             "appearance")
     DemoFlags = unpacked(flags_of(Options, without=KNOWN))
     """Options for recordings that are known."""
     SessionFlags = unpacked(flags_of(Options, without=("camera", "masks", "label", "every", "overlay", "facing", "appearance", "training")))
@@ -51,7 +52,7 @@ KEEPS_UP = 0.6
 """Least share of the pictures that a live session tracks without a hint."""
 
 
-def track(recording: Recording, /, *, folder: Annotated[Path | None, output("Folder of the run. [default: run-<recording>]")] = None,
+def track(recording: RecordingPath, /, *, folder: Annotated[Path | None, output("Folder of the run. [default: run-<recording>]")] = None,
           resume: Annotated[bool, switch("Go on with a run that was broken off, to the same result.")] = False,
           force: Annotated[bool, switch("Replace an earlier run in the folder.")] = False,
           config: Config = None, quiet: Quiet = False, verbose: Verbose = False, flags: RunFlags = None) -> int:
@@ -160,8 +161,8 @@ def live(camera: Annotated[str | None, Parameter(help="The camera, or a film to 
     from time import strftime
 
     from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.live.display.choice import open_display
-    from shadowpuppet.live.run import run_live
+    from shadowpuppet.live.display.view import open_display
+    from shadowpuppet.live.run import check_number, run_live
     from shadowpuppet.live.stream.choice import open_outlets
     from shadowpuppet.viewer.web.live import SpaceDisplay
 
@@ -169,6 +170,7 @@ def live(camera: Annotated[str | None, Parameter(help="The camera, or a film to 
     if camera is not None and asked.setdefault("camera", camera) != camera:
         raise SettingsError(f"camera: found {camera} and --camera {asked['camera']}, expected one of them")
     options, chosen = options_from(flags, config), validate(LiveSettings, asked, "flags")
+    check_number(options)  # before a display is opened
     folder = folder or Path(strftime("live-%Y%m%d-%H%M%S"))
     _check_earlier(folder, force, resumes=False)
     with terminal(quiet, folder) as listener:
@@ -236,7 +238,7 @@ def _show_next(folder: Path) -> None:
               typed("track", "YOUR-FILM.mp4", "--fov", "65", "--height", "1.75", "--overlay"))
 
 
-def fit_person(recording: Recording, /, *, file: Annotated[Path, output("File that gets the sizes.")] = Path("person.toml"),
+def fit_person(recording: RecordingPath, /, *, file: Annotated[Path, output("File that gets the sizes.")] = Path("person.toml"),
                config: Config = None, quiet: Quiet = False, flags: LookFlags = None) -> None:
     """Measure a person once, from reference pictures or the film, or from the first seconds of several cameras; `track --person` uses the
     sizes."""

@@ -13,7 +13,7 @@ from shadowpuppet.output import say
 from shadowpuppet.pipeline.options import Options
 
 if TYPE_CHECKING:
-    from shadowpuppet.viewer.scene.scene import Scene
+    from shadowpuppet.viewer.scene.scene import Stage
 
     ViewFlags = Any
 else:
@@ -70,7 +70,7 @@ def view(what: Annotated[Path, Parameter(help="Folder of a run or a recording, f
         say(f"made  {html}, {html.stat().st_size / 1e6:.1f} MB")
 
 
-def _span(scene: Scene, start: str | None, end: str | None) -> tuple[float | None, float | None]:
+def _span(scene: Stage, start: str | None, end: str | None) -> tuple[float | None, float | None]:
     """Seconds at which the part to be shown begins and ends; None for the scene's own."""
     import numpy as np
 
@@ -92,7 +92,7 @@ def _check(other: Path | None, beside: Path | None, html: Path | None, pictures:
         raise SettingsError(f"flags: beside: found {beside} and {other}, expected one of them")
 
 
-def _serve(scene: Scene, listen: str, port: int | None, opening: bool, quiet: bool) -> None:
+def _serve(scene: Stage, listen: str, port: int | None, opening: bool, quiet: bool) -> None:
     """Serve the page until Ctrl-C."""
     import contextlib
 

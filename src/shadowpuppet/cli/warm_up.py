@@ -15,7 +15,7 @@ FOUR_CAMERAS = Spec(name="warm_four", motion=(Gesture(motion="walk", seconds=2.0
 
 
 def warm_up() -> None:
-    """Track two tiny made recordings, one of one camera and one of four, in a temporary folder; what is compiled is kept."""
+    """Track two tiny made recordings, one of one camera and one of four, in a temporary folder; the compiled code is kept."""
     from shadowpuppet.pipeline.options import make_options
     from shadowpuppet.pipeline.track import track_recording
     from shadowpuppet.synthetic import synthesize

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Alignment, Array, align, vector_from_rotation
-from shadowpuppet.motion.metrics import GROUPS, LOST_ERROR, JointErrors, accelerations, bone_lengths, joint_errors
+from shadowpuppet.motion.interpolation import true_runs
+from shadowpuppet.motion.metrics import LOST_ERROR, JointErrors, accelerations, bone_lengths
 from shadowpuppet.motion.motion import BLANK, JointTable, Motion
 
 ROOT_JOINTS = (("pelvis",), ("left_hip", "right_hip"), ("neck",), ("left_shoulder", "right_shoulder"))
@@ -92,34 +92,20 @@ def world_difference(errors: JointErrors, run: JointTable, truth: JointTable) ->
             "apart": bool(before > MISALIGNED_ERROR and after < MISALIGNED_SHARE * before)}
 
 
-def humaneva_error(run: JointTable, truth: JointTable) -> dict[str, Any]:
-    """HumanEva's error: mean distance over its 15 joints in each frame, then mean and standard deviation over the frames, mm (Sigal, Balan
-    and Black 2010); frames whose truth is incomplete are left out. If joints are missing, only their names, `missing`."""
-    names = GROUPS["humaneva"]
-    missing = {what: [name for name in names if name not in table.names] for what, table in (("run", run), ("truth", truth))}
-    if any(missing.values()):
-        return {"missing": missing}
-    errors = joint_errors(run, truth, names)
-    whole = errors.known.all(1)
-    if not whole.any():
-        return {"missing": {"run": [], "truth": [name for k, name in enumerate(names) if not errors.known[:, k].any()]}}
-    frames = 1000 * errors.distance[whole].mean(1)
-    return {"mean_mm": float(frames.mean()), "sd_mm": float(frames.std()), "frames": int(whole.sum())}
-
-
 def hinge_errors(run: JointTable, truth: JointTable) -> dict[str, dict[str, float]]:
     """Errors of the angles of elbows and knees, degrees: mean, mean absolute value and root mean square;
     `aligned`: that without the mean."""
-    found = {}
-    for name, (ours, theirs) in hinge_angles(run, truth).items():
-        off = ours - theirs
-        found[name] = {"bias": float(off.mean()), "mean": float(np.abs(off).mean()), "rmse": float(np.sqrt((off**2).mean())),
-                       "aligned": float(off.std())}
-    return found
+    return {name: angle_errors(ours - theirs) for name, (ours, theirs) in hinge_angles(run, truth).items()}
+
+
+def angle_errors(off: Array) -> dict[str, float]:
+    """Errors (N,) of an angle: mean, mean absolute value, root mean square, and that without the mean."""
+    return {"bias": float(off.mean()), "mean": float(np.abs(off).mean()), "rmse": float(np.sqrt((off**2).mean())),
+            "aligned": float(off.std())}
 
 
 def hinge_angles(run: JointTable, truth: JointTable) -> dict[str, Array]:
-    """How far elbows and knees are bent in run and truth, degrees, each (2, N), in the frames in which both are known."""
+    """Bends of elbows and knees in run and truth, degrees, each (2, N), in the frames in which both are known."""
     found = {}
     for name, chain in HINGES.items():
         if {*chain} <= {*run.names} & {*truth.names}:
@@ -156,7 +142,7 @@ def pose_losses(motion: Motion) -> dict[str, Any]:
     """Frames without a pose, lost or absent: their number and share, the number of gaps, and the longest gap, measured from the frame
     before it to the one after."""
     blank = np.isin(motion.status, BLANK)
-    gaps = true_stretches(blank)
+    gaps = true_runs(blank)
     found: dict[str, Any] = {"frames": int(blank.sum()), "share": float(blank.mean()) if len(motion) else 0.0, "gaps": len(gaps)}
     if gaps:
         seconds = [float(motion.times[min(end, len(motion) - 1)] - motion.times[max(first - 1, 0)]) for first, end in gaps]
@@ -164,12 +150,6 @@ def pose_losses(motion: Motion) -> dict[str, Any]:
         found |= {"longest_frames": gaps[longest][1] - gaps[longest][0], "longest_s": seconds[longest],
                  "longest_from_s": float(motion.times[gaps[longest][0]])}
     return found
-
-
-def true_stretches(values: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First index and one past the last of each stretch of True in (T,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], values, [False]]).astype(int)))
-    return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
 
 
 def _bend(table: JointTable) -> Array:

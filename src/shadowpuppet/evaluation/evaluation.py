@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,7 +17,6 @@ from shadowpuppet.evaluation.error_metrics import (
     axis_errors,
     bone_errors,
     hinge_errors,
-    humaneva_error,
     pose_losses,
     whole_alignment,
     world_difference,
@@ -30,7 +28,7 @@ from shadowpuppet.evaluation.movement.movement import gait_summary
 from shadowpuppet.evaluation.standing import standing_figures
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.contacts import read_contacts
-from shadowpuppet.io.files.plain import for_json, plain
+from shadowpuppet.io.files.plain import json_text
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.motion_files import check_unit, names_in, read_truth, up_axis
 from shadowpuppet.io.run import Run, read_run, resuming
@@ -76,12 +74,12 @@ class Evaluation:
     table: JointTable | None = None
     """The run's joints at the times compared (T,); None without a truth."""
     truth: JointTable | None = None
-    """The truth at the same times, aligned with the run's world if that was asked for."""
+    """The truth at the same times, in the run's world if `Comparison.align`."""
     errors: JointErrors | None = None
 
 
 def measure_run(folder: str | Path, truth: str | Path | None = None, how: Comparison | None = None) -> Evaluation:
-    """Evaluate a run folder against `truth`, by default that of its recording: `metrics.evaluate` and all of `error_metrics`.
+    """Evaluate a run folder against `truth`, by default its recording's: `metrics.evaluate` and all of `error_metrics`.
 
     Plane and depth are those of the run's camera. Warns if run and truth seem to be in two worlds. Raises `FormatError` or
     `ShadowPuppetError` for files that cannot be used.
@@ -126,8 +124,7 @@ def measure_run(folder: str | Path, truth: str | Path | None = None, how: Compar
 def write_evaluation(path: str | Path, measured: Mapping[str, Any], folder: str | Path) -> None:
     """Write figures as JSON. Raises `ShadowPuppetError` if that fails, or the path is one of the run's own files."""
     check_output(path, folder, ".json")
-    text = json.dumps(for_json(plain(measured, "evaluation")), indent=1, ensure_ascii=False, allow_nan=False)
-    write_whole(Path(path), text + "\n")
+    write_whole(Path(path), json_text(measured, "evaluation") + "\n")
 
 
 def check_output(path: str | Path, folder: str | Path, ending: str) -> None:
@@ -152,8 +149,8 @@ def _error_metrics(run: Run, ours: JointTable, theirs: JointTable, errors: Joint
     """All of `error_metrics`, of tables at the same times."""
     sd = at_times(replace(run.motion.table, positions=run.motion.joint_sd), ours.times).select(errors.names).positions
     return {"aligned_mm": aligned_errors(errors, ours, theirs), "axes_mm": axis_errors(errors),
-            "humaneva": humaneva_error(ours, theirs), "bends_deg": hinge_errors(ours, theirs),
-            "acceleration": acceleration_errors(ours.select(errors.names), theirs), "bone_errors": bone_errors(ours, theirs),
+            "bends_deg": hinge_errors(ours, theirs), "acceleration": acceleration_errors(ours.select(errors.names), theirs),
+            "bone_errors": bone_errors(ours, theirs),
             "coverage": coverage(errors.delta, sd, errors.names), "exchanges": exchanges(ours, theirs)}
 
 
@@ -243,7 +240,7 @@ def _in_our_world(run: Run, truth: JointTable, how: Comparison, path: str | Path
 
 
 def _turned_up(run: JointTable, truth: JointTable, path: str | Path) -> str:
-    """What to do about a truth in which another axis is up than in the run, as text; empty if it is the same."""
+    """Advice for a truth with another up axis than the run's; empty if both have the same."""
     axis = up_axis(truth)
     if axis == "+z" or up_axis(run) != "+z":
         return ""

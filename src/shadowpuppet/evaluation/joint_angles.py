@@ -6,6 +6,7 @@ import numpy as np
 
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.evaluation.error_metrics import angle_errors
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable, Motion
@@ -59,15 +60,12 @@ def dof_errors(skeleton: Skeleton, ours: Array, theirs: Array) -> dict[str, dict
     found = {}
     for d, dof in enumerate(skeleton.dofs):
         if dof.kind == "rotation" and not dof.joint.endswith(UNOBSERVABLE):
-            off = np.degrees(wrapped(ours[:, d] - theirs[:, d]))
-            found[dof.name] = {"bias": float(off.mean()), "mean": float(np.abs(off).mean()), "rmse": float(np.sqrt((off**2).mean())),
-                               "aligned": float(off.std())}
+            found[dof.name] = angle_errors(np.degrees(wrapped(ours[:, d] - theirs[:, d])))
     return found
 
 
 def frame_aligned(ours: Array, theirs: Array) -> Array:
-    """Rotations (N, 3, 3) with one constant rotation before them and one behind them, those that bring them nearest to others (N, 3, 3):
-    each is found in turn."""
+    """Rotations (N, 3, 3) between two constant ones that bring them nearest to others (N, 3, 3); the two are found in turn."""
     above, below = np.eye(3), np.eye(3)
     for _ in range(ALIGNMENTS):
         below = _nearest_rotation((ours.swapaxes(1, 2) @ above.T @ theirs).sum(0))

@@ -1,4 +1,4 @@
-"""Evaluation of a run of several people: who is who, how often one is missed, invented or exchanged, and the joint errors of each."""
+"""Evaluation of a run of several people: identities, misses, false positives, swaps, and the joint errors of each person."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REACH = 0.5
 
 
 class Identities(NamedTuple):
-    """Who is who, in T frames with G truths and P tracked people."""
+    """Identities of P tracked people among G truths in T frames."""
 
     mota: float
     """1 less the share of misses, false positives and swaps in the people who are there (Bernardin & Stiefelhagen 2008)."""
@@ -39,7 +39,7 @@ class Identities(NamedTuple):
 
 
 def identities(truth: Array, found: Array) -> Identities:
-    """Who is who, from the places of truths (T, G, 2 or 3) and of tracked people (T, P, 2 or 3), metres; NaN where one is not there."""
+    """Identities from the places of truths (T, G, 2 or 3) and of tracked people (T, P, 2 or 3), metres; NaN where one is not there."""
     from scipy.optimize import linear_sum_assignment
 
     away = np.linalg.norm(truth[:, :, None] - found[:, None], axis=-1)
@@ -71,7 +71,7 @@ def identities(truth: Array, found: Array) -> Identities:
 
 def measure_people(folder: str | Path, truths: Sequence[Path] = ()) -> dict[str, Any]:
     """Figures of a run of several people against truths, by default truth_1.csv, truth_2.csv, ... of its recording: `identities`, and the
-    joint errors of each person who is matched. Raises a `ShadowPuppetError` for files that cannot be used."""
+    joint errors of each matched person. Raises a `ShadowPuppetError` for files that cannot be used."""
     folders = person_folders(folder)
     if not folders:
         raise FormatError(f"{folder}: found no people.csv and person-1, expected the run of several people")

@@ -38,7 +38,7 @@ def overlap_sense(overlap: float) -> str:
 
 
 def doubt_text(metrics: Mapping[str, Any]) -> str | None:
-    """In what share of frames each limb is not vouched for, and in how many frames the outline fits; None if unknown or without frames."""
+    """Share of frames in which each limb is doubtful, and number of frames in which the outline fits; None if unknown or without frames."""
     limbs, frames = metrics.get("limb_status"), metrics["frames"]
     if not limbs or not frames:
         return None

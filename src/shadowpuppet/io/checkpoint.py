@@ -28,7 +28,7 @@ class Checkpoint(NamedTuple):
     frames: int
     """Number of frames."""
     state: Any
-    """What the next frame needs of those before, as `io.files.nested` can write it."""
+    """State that the next frame needs, as `io.files.nested` can write it."""
 
 
 def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, choices, reason, warn
-from shadowpuppet.io.export_formats import FORMATS, Format, Layout, Puppet, RunExport
+from shadowpuppet.io.export_formats import FORMATS, ExportFormat, Layout, Puppet, RunExport
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.motion import EXPORTS, READABLE
 from shadowpuppet.io.motion.c3d import read_header
@@ -127,7 +127,7 @@ def _warn_of_channels(source: Path) -> None:
         warn(f"{source}: its {len(channels)} analog channels ({shorten(channels, 60)}) are left out: only points are converted")
 
 
-def _fitted(source: Path, target: Path, table: JointTable, written: Format, layout: Layout) -> str:
+def _fitted(source: Path, target: Path, table: JointTable, written: ExportFormat, layout: Layout) -> str:
     """Fit a body's poses to joints and write them; returns a summary."""
     try:
         fit = fit_poses(table, source=str(source))

@@ -21,8 +21,7 @@ from shadowpuppet.io.motion.characters.usd import write_usda
 from shadowpuppet.io.motion.glb import write_glb
 from shadowpuppet.io.motion.npz import write_motion_npz, write_npz
 from shadowpuppet.io.motion.opensim.coordinates import MODELS, coordinates
-from shadowpuppet.io.motion.opensim.markers import marker_names
-from shadowpuppet.io.motion.opensim.model_writer import write_osim
+from shadowpuppet.io.motion.opensim.model_writer import marker_names, write_osim
 from shadowpuppet.io.motion.opensim.mot import write_mot
 from shadowpuppet.io.motion.parquet import write_parquet
 from shadowpuppet.io.motion.table import dof_unit, motion_columns, table_columns, write_columns, write_joints
@@ -62,16 +61,11 @@ class Layout(NamedTuple):
     def checked(cls, unit: str | None, missing: str, model: str = "rajagopal", weight: float | None = None, rest: str = "hang",
                 names: str | None = None) -> Layout:
         """A layout. Raises `SettingsError` if a choice is unknown."""
-        if unit is not None and unit not in METRES:
-            raise SettingsError(f"unit: found {unit!r}, expected one of {choices(METRES)}")
-        if missing not in MISSING:
-            raise SettingsError(f"missing: found {missing!r}, expected one of {choices(MISSING)}")
-        if model not in MODELS:
-            raise SettingsError(f"model: found {model!r}, expected one of {choices(MODELS)}")
+        for what, value, known in (("unit", unit, METRES), ("missing", missing, MISSING), ("model", model, MODELS), ("rest", rest, RAISED)):
+            if value not in known and not (what == "unit" and value is None):
+                raise SettingsError(f"{what}: found {value!r}, expected one of {choices(known)}")
         if weight is not None and not 1 <= weight <= 500:
             raise SettingsError(f"weight: found {weight}, expected kilograms from 1 to 500")
-        if rest not in RAISED:
-            raise SettingsError(f"rest: found {rest!r}, expected one of {choices(RAISED)}")
         if names is not None:
             bone_names(names)
         return cls(unit, missing, model, weight, rest, names)
@@ -149,7 +143,7 @@ class RunExport:
 
     @property
     def smoothing(self) -> str:
-        """How the motion was smoothed, in words; empty if unknown."""
+        """Smoothing of the motion, in words; empty if unknown."""
         return smoothing_text(self.run.info.get("smoothing"))
 
     @property
@@ -168,7 +162,7 @@ def smoothing_text(info: object) -> str:
     return "none" if info["method"] == "off" else "fixed-interval, over poses"
 
 
-class Format(NamedTuple):
+class ExportFormat(NamedTuple):
     """The writers of a format: of a run, of joints alone, or of a skeleton; None if there is none."""
 
     run: Callable[[RunExport, Path], None] | None = None
@@ -218,22 +212,22 @@ def _write_usda(path: Path, puppet: Puppet, layout: Layout, smoothing: str = "")
 
 
 FORMATS = {
-    "c3d": Format(lambda export, path: write_c3d(path, export.run.motion.table, export.spread, export.angles, export.smoothing,
+    "c3d": ExportFormat(lambda export, path: write_c3d(path, export.run.motion.table, export.spread, export.angles, export.smoothing,
                                                  export.events),
                   lambda path, table, layout: write_c3d(path, table)),
-    "trc": Format(lambda export, path: _write_markers(path, export.run.motion.table, export.layout), _write_markers),
-    "csv": Format(lambda export, path: write_columns(path, motion_columns(export.run.motion)),
+    "trc": ExportFormat(lambda export, path: _write_markers(path, export.run.motion.table, export.layout), _write_markers),
+    "csv": ExportFormat(lambda export, path: write_columns(path, motion_columns(export.run.motion)),
                   lambda path, table, layout: write_joints(path, table)),
-    "npz": Format(lambda export, path: write_motion_npz(path, export.run.motion), lambda path, table, layout: write_npz(path, table)),
-    "bvh": Format(skeleton=_write_bvh, any_skeleton=True),
-    "glb": Format(lambda export, path: _write_glb(path, export.puppet, export.layout, export.smoothing), skeleton=_write_glb,
+    "npz": ExportFormat(lambda export, path: write_motion_npz(path, export.run.motion), lambda path, table, layout: write_npz(path, table)),
+    "bvh": ExportFormat(skeleton=_write_bvh, any_skeleton=True),
+    "glb": ExportFormat(lambda export, path: _write_glb(path, export.puppet, export.layout, export.smoothing), skeleton=_write_glb,
                   any_skeleton=True),
-    "usda": Format(lambda export, path: _write_usda(path, export.puppet, export.layout, export.smoothing), skeleton=_write_usda,
+    "usda": ExportFormat(lambda export, path: _write_usda(path, export.puppet, export.layout, export.smoothing), skeleton=_write_usda,
                    any_skeleton=True),
-    "mot": Format(lambda export, path: _write_coordinates(path, export.puppet, export.layout, export.smoothing),
+    "mot": ExportFormat(lambda export, path: _write_coordinates(path, export.puppet, export.layout, export.smoothing),
                   skeleton=_write_coordinates),
-    "osim": Format(skeleton=_write_model),
-    "parquet": Format(lambda export, path: write_parquet(path, motion_columns(export.run.motion), export.smoothing),
+    "osim": ExportFormat(skeleton=_write_model),
+    "parquet": ExportFormat(lambda export, path: write_parquet(path, motion_columns(export.run.motion), export.smoothing),
                       lambda path, table, layout: write_parquet(path, table_columns(table))),
 }
 """The writers of each of `EXPORTS`."""

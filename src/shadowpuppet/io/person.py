@@ -25,7 +25,7 @@ class Person:
     height: float | None = None
     """Metres, with shoes; None if unknown."""
     source: str = ""
-    """How the sizes were found, such as `references` or `proportions`."""
+    """Source of the sizes, such as `references` or `proportions`."""
     notes: str = ""
     """Any text."""
 

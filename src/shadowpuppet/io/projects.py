@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from shadowpuppet.body.sizes import HEIGHTS, is_within
-from shadowpuppet.errors import RecordingError, choices
+from shadowpuppet.errors import RecordingError, choices, shown
 from shadowpuppet.io.calibration.formats import find_calibration
 from shadowpuppet.io.files.text import read_limited, read_toml
 from shadowpuppet.names import composed
@@ -25,7 +25,9 @@ from shadowpuppet.video import FILM_SUFFIXES
 
 LEVELS = 2
 """Pose2Sim's folders above a trial, participant and session, whose settings and calibration hold for it."""
-CONFIG_BYTES = 1_000_000
+CONFIG_BYTES, MOST_FRAMES = 1_000_000, 10**9
+RATES = (0.1, 10_000.0)
+"""Limits of frames/s."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,8 @@ class Project:
     """Frames/s, where the project replaces the films' own."""
     frames: tuple[int, int] | None = None
     """First and last frame used."""
+    several: bool = False
+    """Whether it states several people."""
     no_calibration: str = ""
     """Why there is no calibration, and what to do."""
 
@@ -91,8 +95,8 @@ def _pose2sim(folder: Path) -> Project | None:
     calibration = next((found for place in places if (found := find_calibration(place)) is not None), None)
     known = _Config(folder / "Config.toml", [config.get("project", {}) for config in configs])
     return Project("Pose2Sim", folder, folder.resolve().name, films, calibration, ("trc", folder / "pose-3d"), known.height(),
-                   known.number("frame_rate"), known.frames(),
-                   "Pose2Sim's calibration, a file in calibration/ beside or above the trial, is missing")
+                   known.rate(), known.frames(),
+                   known.several(), "Pose2Sim's calibration, a file in calibration/ beside or above the trial, is missing")
 
 
 def _levels(folder: Path) -> Iterator[Path]:
@@ -121,9 +125,18 @@ class _Config:
     def _value(self, key: str) -> Any:
         return next((table[key] for table in self.tables if key in table), "auto")
 
-    def number(self, key: str) -> float | None:
-        value = self._value(key)
-        return float(value) if isinstance(value, int | float) and not isinstance(value, bool) and value > 0 else None
+    def several(self) -> bool:
+        """`multi_person`."""
+        return self._value("multi_person") is True
+
+    def rate(self) -> float | None:
+        """`frame_rate`, unless it is a word or zero."""
+        value = self._value("frame_rate")
+        if isinstance(value, str) or not value:
+            return None
+        if not is_within(value, RATES):
+            raise RecordingError(f"{self.path}: project.frame_rate: found {shown(value)}, expected {RATES[0]:g} to {RATES[1]:g} frames/s")
+        return float(value)
 
     def height(self) -> float | None:
         """The height, if it is one person's."""
@@ -132,8 +145,8 @@ class _Config:
         if isinstance(value, str | list):
             return None
         if not is_within(value, HEIGHTS):
-            raise RecordingError(f"{self.path}: project.participant_height: found {value!r}, expected {HEIGHTS[0]:g} to {HEIGHTS[1]:g} "
-                                 "metres")
+            raise RecordingError(f"{self.path}: project.participant_height: found {shown(value)}, expected {HEIGHTS[0]:g} to "
+                                 f"{HEIGHTS[1]:g} metres")
         return float(value)
 
     def frames(self) -> tuple[int, int] | None:
@@ -141,8 +154,9 @@ class _Config:
         if isinstance(value, str) or value == []:
             return None
         whole = isinstance(value, list) and len(value) == 2 and all(isinstance(n, int) and not isinstance(n, bool) for n in value)
-        if not whole or not 0 <= value[0] < value[1]:
-            raise RecordingError(f"{self.path}: project.frame_range: found {value!r}, expected 'auto', 'all', or the first and last frame")
+        if not whole or not 0 <= value[0] < value[1] < MOST_FRAMES:
+            raise RecordingError(f"{self.path}: project.frame_range: found {shown(value)}, expected 'auto', 'all', or the first and last "
+                                 "frame")
         return value[0], value[1]
 
 

@@ -15,20 +15,16 @@ from shadowpuppet.errors import RecordingError, choices, reason, typed, warn
 from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, read_calibration
 from shadowpuppet.io.calibration.formats import find_calibration
 from shadowpuppet.io.picture_sizes import fitting
-from shadowpuppet.io.projects import Project, films_in, find_project, sources_in
+from shadowpuppet.io.projects import RATES, Project, films_in, find_project, sources_in
 from shadowpuppet.io.recording_toml import RecordingNotes
+from shadowpuppet.io.shared_rate import shared_rate
 from shadowpuppet.names import composed, spelled_as
 from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES, camera_number, open_frames
-from shadowpuppet.video.film import is_steady
 
 POSTURES = ("front_t_pose", "side_arms_hanging", "front_arms_t_pose")
 """Reference postures of Liu 2011's initialisation, for O1, O2 and O3 (IV-A)."""
 BOARD_FOLDERS = ("intrinsics", "extrinsics", "floor")
 """Folders of films of a board, from which cameras are calibrated."""
-RATES = (0.1, 10_000.0)
-"""Limits of `rate`, frames/s."""
-LIKE, APART = 0.1, 0.5
-"""Greatest relative difference of the rates of films in step by number, and least number of frames by which these rates part them."""
 STARTS, DURATIONS = (0.0, 100_000.0), (1e-3, 1e6)
 """Limits of `start` and `duration`, seconds."""
 
@@ -96,6 +92,8 @@ class Recording:
     """First moment used, seconds after time 0; the frames before are passed over, and times stay those after time 0."""
     truths: tuple[Path, ...] = ()
     """With several people: truth_1.csv, truth_2.csv, ..., one for each."""
+    several: bool = False
+    """Whether the project of another program states several people."""
     whole: Recording | None = None
     """The whole recording, where this is a part of it (`--start`, `--end`); None otherwise."""
 
@@ -217,25 +215,7 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
     recording = Recording(folder, folder.resolve().name, views, Subject(height, distance), references, truth, training, rate, duration,
                           truths=_truths(folder))
     recording = recording if project is None else _with_facts(recording, project)
-    return recording if starts else _in_step(recording)
-
-
-def _in_step(recording: Recording) -> Recording:
-    """The recording at one rate, with a warning, if its films have equal numbers of frames and slightly different, steady rates: programs
-    that record several cameras in step write what each camera measured as its rate."""
-    sources = [view.video for view in recording.views]
-    if recording.rate is not None or len(sources) < 2 or not all(isinstance(each, Path) and each.is_file() for each in sources):
-        return recording
-    films = [open_frames(each) for each in sources]
-    number, rates = films[0].count, sorted(film.rate for film in films)
-    if not number or any(film.count != number for film in films) or not 0 < (1 - rates[0] / rates[-1]) <= LIKE:
-        return recording
-    if number * (1 - rates[0] / rates[-1]) < APART or not all(is_steady(Path(str(each))) for each in sources):
-        return recording
-    rate = rates[(len(rates) - 1) // 2]
-    warn(f"{recording.path}: the films have {number} frames each at {rates[0]:.4g} to {rates[-1]:.4g} frames/s: they are taken to be in "
-         f"step by number, at {rate:.4g} frames/s; if they are not, say in [start] of recording.toml when each began")
-    return replace(recording, rate=rate)
+    return recording if starts or recording.rate is not None else replace(recording, rate=shared_rate(folder, [v.video for v in views]))
 
 
 def _in_order(cameras: tuple[Camera, ...], films: dict[str, Any], project: Project) -> tuple[Camera, ...]:
@@ -256,7 +236,8 @@ def _with_facts(recording: Recording, project: Project) -> Recording:
         of_film = rate or open_frames(recording.views[0].video).rate
         begin, duration = max(first - 0.5, 0) / of_film, (last + 0.5) / of_film
     subject = replace(recording.subject, height=recording.subject.height or project.height)
-    return replace(recording, name=project.name, subject=subject, rate=rate, begin=begin, duration=duration)
+    return replace(recording, name=project.name, subject=subject, rate=rate, begin=begin, duration=duration,
+                   several=project.several)
 
 
 def _truths(folder: Path) -> tuple[Path, ...]:

@@ -8,7 +8,7 @@
     motion.npz     the fields of `Motion`, arrays only
     raw.csv        joints.csv and angles.csv as they were tracked, if they were smoothed afterwards; then run.toml has [smoothing]
     run.toml       complete, frames, body, versions, and what the tracker adds: recording, method, seed, settings, sizes, ...; [floor] with
-                   its height in the world (m) where that is not 0, as before a camera of which only the field of view is known
+                   its height in the world (m) where that is not 0, as before a camera that is known by its field of view alone
     metrics.json   complete, frames, status (number of frames of each), limb_status (likewise, by limb), timings, errors, ...
 
 The tables grow with every frame; the other files are written at the end, also after an error. `complete` in run.toml says whether all
@@ -77,7 +77,7 @@ def read_run(folder: str | Path) -> Run:
     """Read a run folder, also a killed run's. Raises `FormatError`, naming file, line and column, if something is malformed."""
     folder = Path(folder)
     if not folder.exists():
-        raise FormatError(f"{folder}: no such folder, expected that of a run, as `shadowpuppet track` writes it")
+        raise FormatError(f"{folder}: no such folder, expected a run's, as `shadowpuppet track` writes it")
     if not (folder / "run.toml").exists():
         film = any((folder / name).exists() for name in ("video", "recording.toml", "calibration.toml"))
         hint = f"; it is a recording: track it first (`{typed('track', folder)}`)" if film else ""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import platform
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -16,11 +15,11 @@ from shadowpuppet.io import checkpoint
 from shadowpuppet.io.angle_conventions import write_angles
 from shadowpuppet.io.contacts import write_contacts
 from shadowpuppet.io.files.lock import LOCK, Lock, locked
-from shadowpuppet.io.files.plain import for_json, for_toml, plain
+from shadowpuppet.io.files.plain import for_toml, json_text, plain
 from shadowpuppet.io.files.table import csv_line
 from shadowpuppet.io.files.text import read_toml, write_whole
 from shadowpuppet.io.inputs.earlier_run import check_folder, unmark
-from shadowpuppet.io.inputs.inputs import Resuming
+from shadowpuppet.io.inputs.inputs import NO_INPUTS, Inputs, Resuming
 from shadowpuppet.io.inputs.same_run import INPUTS, check_same, write_inputs
 from shadowpuppet.io.intervals import IntervalWriter
 from shadowpuppet.io.motion.npz import write_motion_npz
@@ -45,17 +44,17 @@ class CompleteRun(ShadowPuppetError):
 class RunWriter:
     """Writes a run: `with RunWriter(...) as run: run.write(frame)`; `run.metrics` may be filled until the end.
 
-    The folder must be new, empty or that of an earlier run, which is replaced by `begin`, at the latest when the first frame is written.
+    The folder must be new, empty or an earlier run's, which is replaced by `begin`, at the latest when the first frame is written.
     Raises `ShadowPuppetError` for any other folder, for one in which another run is being written, and if it cannot be written; frames
     written before stay readable. It also does so, and the run is not complete, if the folder or its lock is taken away while the run goes
     on, or if one of its inputs changes.
     """
 
     def __init__(self, folder: str | Path, body_name: str, dof_names: Sequence[str], joint_names: Sequence[str],
-                 info: Mapping[str, Any], resume: Resuming | None = None, of_group: bool = False) -> None:
+                 info: Mapping[str, Any], resume: Resuming | Inputs = NO_INPUTS, of_group: bool = False) -> None:
         """`info`: entries of run.toml; dataclasses, arrays and paths are converted, values of None are left out. `resume`: whether an
-        earlier run of the same `info` and inputs goes on from its checkpoint; None: no checkpoints are kept. `of_group`: whether it is that
-        of one of several people, who have one checkpoint together."""
+        earlier run of the same `info` and inputs goes on from its checkpoint; inputs alone: no checkpoints are kept. `of_group`: whether it
+        is the run of one of several people, with one checkpoint for all."""
         taken = set(info) & set(OWN_KEYS)
         if taken:
             raise ShadowPuppetError(f"info: found {min(taken)!r}, which the run's writer fills in itself")
@@ -66,7 +65,8 @@ class RunWriter:
         self._modes = dict[float, Sequence[Mode]]()
         """Other places of limbs, by time: a motion does not keep them."""
         self._tables: Sequence[BinaryIO] = ()
-        self._resume, self._earlier, self._stack = resume, False, contextlib.ExitStack()
+        self._resume, self._inputs = (None, resume) if isinstance(resume, Inputs) else (resume, resume.inputs)
+        self._earlier, self._stack = False, contextlib.ExitStack()
         self._lock: Lock
         self._before: list[MotionFrame] | None = None
         self._people, self._of_group = False, of_group
@@ -90,7 +90,7 @@ class RunWriter:
 
     @property
     def _goes_on(self) -> Resuming | None:
-        """How an earlier run in the folder goes on; None if the run begins at the start."""
+        """The resumption of an earlier run in the folder; None if the run begins at the start."""
         return self._resume if self._resume is not None and self._resume.goes_on and self._earlier else None
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -114,7 +114,7 @@ class RunWriter:
         """Raise `ShadowPuppetError` if the folder is not this run's any more, or if one of its inputs differs from what it was when the run
         began: in size or time of change."""
         self._lock.check()
-        if changed := "" if self._resume is None else self._resume.inputs.changed():
+        if changed := self._inputs.changed():
             raise ShadowPuppetError(f"{self.folder}: {changed} while the run went on: it is not complete, as its frames would be of two "
                                     "recordings; track it again with --force")
 
@@ -145,7 +145,7 @@ class RunWriter:
                 (self.folder / "run.toml").unlink()
 
     def hand_over(self, types: Iterable[type] = ()) -> Any:
-        """Make the folder that of several people: only run.toml is written in it, with `people`; their runs go into folders of their own
+        """Make the folder one of several people: only run.toml is written in it, with `people`; their runs go into folders of their own
         (`io.people`). Returns the state of the last `checkpoint` of an earlier run that goes on; else that is removed, and there is none.
         `types`: as in `resumed`."""
         found = checkpoint.read_checkpoint(self.folder, types) if self._goes_on else None
@@ -162,6 +162,16 @@ class RunWriter:
         self._write_info(complete=False)
         self._keep_inputs()
         return None
+
+    def adopt(self, only: RunWriter) -> None:
+        """Make the run of the only one of several people that was followed this run, in this folder. Raises `ShadowPuppetError`."""
+        with self._system_errors():
+            for path in only.folder.iterdir():
+                if path.name in (*FILES, RAW):
+                    path.replace(self.folder / path.name)
+            remove_people(self.folder, (*FILES, "run.toml", LOCK))
+        self._motion = only._motion
+        self.info = {key: value for key, value in only.info.items() if key != "person"}
 
     def resumed(self, types: Iterable[type]) -> tuple[Any, list[MotionFrame]] | None:
         """The state that the last `checkpoint` of the earlier run got, and its frames until then, from which `begin` goes on; None if the
@@ -301,7 +311,7 @@ class RunWriter:
     def _keep_inputs(self) -> None:
         """Keep what the run's inputs hold, for a run that goes on."""
         if self._resume is not None and not self._of_group:
-            write_inputs(self.folder, self._resume.inputs)
+            write_inputs(self.folder, self._inputs)
 
     def _check_same(self, resume: Resuming, earlier: Mapping[str, Any]) -> None:
         """Raise `CompleteRun` if an earlier run is complete, `ShadowPuppetError` if it is another one than this."""
@@ -333,8 +343,7 @@ def _append(tables: Sequence[BinaryIO], rows: tuple[list[str], list[str]], inter
 
 def write_metrics(folder: str | Path, metrics: Mapping[str, Any]) -> None:
     """Write metrics.json; NaN becomes null. Raises `ShadowPuppetError` if that fails."""
-    text = json.dumps(for_json(plain(metrics, "metrics")), indent=1, ensure_ascii=False, allow_nan=False)
-    write_whole(Path(folder) / "metrics.json", text + "\n")
+    write_whole(Path(folder) / "metrics.json", json_text(metrics, "metrics") + "\n")
 
 
 def versions() -> dict[str, str]:

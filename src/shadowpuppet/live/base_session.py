@@ -16,7 +16,7 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.geometry import Array
-from shadowpuppet.live.display.view import Angle, View
+from shadowpuppet.live.display.view import DofAngle, SessionState
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.motion.motion import MotionFrame
@@ -36,14 +36,14 @@ LAG = 0.1
 """Lag (s) of smoothed motion: more takes hardly more of the shaking away (docs/live.md)."""
 
 
-Images = tuple[Image | None, ...]
+Pictures = tuple[Image | None, ...]
 """Each camera's picture; None of one that has none at that moment."""
 Masks = tuple[Mask | None, ...]
 """Each camera's silhouette (H, W), likewise."""
 
 
-class Moment(Protocol):
-    """What a session needs to know of a picture, or of a set of pictures."""
+class CapturedShot(Protocol):
+    """A picture, or a set of pictures, as a session sees it."""
 
     @property
     def captured(self) -> float:
@@ -61,18 +61,18 @@ class Moment(Protocol):
         ...
 
 
-Shot = TypeVar("Shot", bound=Moment)
+Shot = TypeVar("Shot", bound=CapturedShot)
 """A picture of one camera, or a set of pictures of several."""
 Result = TypeVar("Result")
 
 
-class Outcome(NamedTuple):
+class StepResult(NamedTuple):
     """Result of processing a picture, or of waiting for one."""
 
-    view: View
+    view: SessionState
     frame: MotionFrame | None = None
     """Motion of the frame, as tracked; None unless a person is tracked."""
-    images: Images = ()
+    images: Pictures = ()
     """Each camera's picture, of the working size."""
     given: tuple[Given, ...] = ()
     """Frames for other programs, of this picture or of some before, when there is a lag."""
@@ -88,10 +88,10 @@ class Given(NamedTuple):
 
 
 class _Waiting(NamedTuple):
-    """What is shown of a frame that waits for the next ones."""
+    """Pictures and masks of a frame that waits for the next ones."""
 
     captured: float
-    images: Images
+    images: Pictures
     masks: Masks
 
 
@@ -128,7 +128,7 @@ class LiveSession(ABC, Generic[Shot, State, Observation, Before]):
         self._lagging: FixedLag | None = None
         """Smooths the frames; None without a lag, and before there is a person."""
         self._waiting = dict[float, _Waiting]()
-        """What belongs to the frames that wait, by their times."""
+        """Waiting frames' pictures and masks, by time."""
         self.leans = array("d")
         """`TrackedSubject.lean` of each frame."""
         self._watch: RigWatch | None = None
@@ -143,7 +143,7 @@ class LiveSession(ABC, Generic[Shot, State, Observation, Before]):
 
     # Input
 
-    def step(self, shot: Shot) -> Outcome:
+    def step(self, shot: Shot) -> StepResult:
         """Process a picture, or a set of pictures. Raises `SilhouetteError` if the background cannot be learnt."""
         self._began = shot.captured if np.isnan(self._began) else self._began
         if trouble := self.check(shot):
@@ -160,10 +160,10 @@ class LiveSession(ABC, Generic[Shot, State, Observation, Before]):
             return ()
         return self._aged(self._lagging.rest())
 
-    def idle(self, problem: str = "") -> Outcome:
+    def idle(self, problem: str = "") -> StepResult:
         """Handle that no picture came for a moment; `problem`: the reason, if known."""
         trouble = self.silence(self.clock(), problem)
-        return self._pause(trouble) if trouble else Outcome(self._view())
+        return self._pause(trouble) if trouble else StepResult(self._view())
 
     def ask(self, wish: str) -> None:
         """Carry out a command: `learn` the background again, or `measure` the person again. Ignored in phases that do not allow it."""
@@ -221,23 +221,23 @@ class LiveSession(ABC, Generic[Shot, State, Observation, Before]):
         """Start waiting for a person."""
 
     @abstractmethod
-    def _scaled(self, shot: Shot) -> Images: ...
+    def _scaled(self, shot: Shot) -> Pictures: ...
 
     @abstractmethod
-    def _see(self, shot: Shot, images: Images) -> Seen: ...
+    def _see(self, shot: Shot, images: Pictures) -> Seen: ...
 
     @abstractmethod
-    def _learn(self, shot: Shot, images: Images) -> Outcome: ...
+    def _learn(self, shot: Shot, images: Pictures) -> StepResult: ...
 
     @abstractmethod
-    def _wait(self, shot: Shot, images: Images) -> Outcome: ...
+    def _wait(self, shot: Shot, images: Pictures) -> StepResult: ...
 
     @abstractmethod
-    def _measure(self, shot: Shot, images: Images) -> Outcome: ...
+    def _measure(self, shot: Shot, images: Pictures) -> StepResult: ...
 
     @abstractmethod
-    def _shown(self, images: Images, masks: Masks, frame: MotionFrame | None) -> dict[str, Any]:
-        """The fields image, mask and picture of a `View`."""
+    def _shown(self, images: Pictures, masks: Masks, frame: MotionFrame | None) -> dict[str, Any]:
+        """The fields image, mask and picture of a `SessionState`."""
 
     @abstractmethod
     def _message(self, masks: Masks) -> tuple[str, float | None]:
@@ -249,7 +249,7 @@ class LiveSession(ABC, Generic[Shot, State, Observation, Before]):
 
     # Shared by all sessions
 
-    def _track(self, shot: Shot, images: Images) -> Outcome:
+    def _track(self, shot: Shot, images: Pictures) -> StepResult:
         assert self.subject is not None
         seen = self._see(shot, images)
         masks, observation = seen.masks, self.subject.observe(seen if self._watch is None else self._watch(shot.captured, seen))
@@ -267,20 +267,20 @@ class LiveSession(ABC, Generic[Shot, State, Observation, Before]):
             self._lost_since = shot.captured
         if self._lagging is None:
             late = now - shot.captured
-            return Outcome(self._view(images, masks, frame, late), frame, images, (Given(frame, late),))
+            return StepResult(self._view(images, masks, frame, late), frame, images, (Given(frame, late),))
         return self._later(_Waiting(shot.captured, images, masks), frame)
 
-    def _later(self, waiting: _Waiting, frame: MotionFrame) -> Outcome:
+    def _later(self, waiting: _Waiting, frame: MotionFrame) -> StepResult:
         """The outcome of a frame that waits for the next ones: it shows the newest of those that are due, if any is."""
         assert self._lagging is not None
         self._waiting[frame.time] = waiting
         before = dict(self._waiting)
         given = self._aged(self._lagging(frame))
         if not given:
-            return Outcome(self._view(), frame, waiting.images)
+            return StepResult(self._view(), frame, waiting.images)
         shown = before[given[-1].frame.time]
         self.timing.given(given[-1].age)
-        return Outcome(self._view(shown.images, shown.masks, *given[-1]), frame, waiting.images, given)
+        return StepResult(self._view(shown.images, shown.masks, *given[-1]), frame, waiting.images, given)
 
     def _aged(self, frames: Sequence[MotionFrame]) -> tuple[Given, ...]:
         """Frames that wait no more."""
@@ -298,20 +298,20 @@ class LiveSession(ABC, Generic[Shot, State, Observation, Before]):
         self.phase, self._state, self._before = "tracking", None, None
         self.timing.pause()
 
-    def _pause(self, trouble: str) -> Outcome:
+    def _pause(self, trouble: str) -> StepResult:
         """Handle a missing or unusable picture: keep the person, restart countdowns and collections."""
         self.trouble = trouble
         self._forget_time()
         self.timing.pause()
-        return Outcome(self._view(), given=self.rest())
+        return StepResult(self._view(), given=self.rest())
 
-    def _view(self, images: Images = (), masks: Masks = (), frame: MotionFrame | None = None,
-              latency: float = np.nan) -> View:
+    def _view(self, images: Pictures = (), masks: Masks = (), frame: MotionFrame | None = None,
+              latency: float = np.nan) -> SessionState:
         pose = None if frame is None or frame.pose is None else np.asarray(frame.pose)
         message, countdown = self._message(masks)
         doubtful = doubtful_names(self.subject.body, frame.limb_status) if frame and self.subject else frozenset[str]()
         angles = _angles(self.subject.body, pose) if self.phase == "tracking" and self.subject else ()
-        return View(
+        return SessionState(
             phase=self.phase, message=message, countdown=countdown, trouble=self.trouble, status=frame.status if frame else "",
             overlap=frame.overlap if frame and pose is not None else np.nan, angles=angles, latency=latency, rate=self.timing.rate,
             interval=self.timing.interval, dropped=self.timing.dropped, pose=pose, doubtful=doubtful,
@@ -334,9 +334,9 @@ def scaled(image: Image, camera: Camera) -> Image:
     return np.asarray(cv2.resize(image, camera.size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _angles(body: Body, pose: Array | None) -> tuple[Angle, ...]:
+def _angles(body: Body, pose: Array | None) -> tuple[DofAngle, ...]:
     """All rotational DOF, degrees; limits are -180 and 180 for a DOF without limits."""
     values: Sequence[float] = np.full(len(body.skeleton.dofs), np.nan).tolist() if pose is None else pose.tolist()
     rotations = [(dof, value) for dof, value in zip(body.skeleton.dofs, values) if dof.kind == "rotation"]
-    return tuple(Angle(dof.name.replace("_", " "), math.degrees(value), round(math.degrees(dof.low)) if math.isfinite(dof.low) else -180,
+    return tuple(DofAngle(dof.name.replace("_", " "), math.degrees(value), round(math.degrees(dof.low)) if math.isfinite(dof.low) else -180,
                        round(math.degrees(dof.high)) if math.isfinite(dof.high) else 180) for dof, value in rotations)

@@ -23,11 +23,11 @@ from shadowpuppet.video import Image
 
 MEASURED, FEWEST = 12, 4
 """Number of moments in which a person is measured, and the least number."""
-Fit = Callable[[list[Mask]], SizeFit]
+SizesFrom = Callable[[list[Mask]], SizeFit]
 """Measures a person in masks (H, W). Raises `TrackingError` if none is found."""
 
 
-class EmptyScene(NamedTuple):
+class EmptyRoom(NamedTuple):
     """Pictures of an empty scene, or one that was recovered from pictures with a person."""
 
     pictures: list[Image]
@@ -35,7 +35,7 @@ class EmptyScene(NamedTuple):
     """Pixels (H, W) that the person always covered; None for a scene that was seen empty."""
     recovered: bool = False
 
-    def silhouettes(self, task: Task, film: Sequence[Image]) -> tuple[Silhouettes, Silhouettes]:
+    def silhouettes(self, task: LookTask, film: Sequence[Image]) -> tuple[Silhouettes, Silhouettes]:
         """Silhouettes before this scene, for tracking and for measuring; `film`: pictures with the person, for noise and the blur of
         outlines."""
         asked, clean = task.settings, clean_settings(task.settings)
@@ -49,10 +49,10 @@ class EmptyScene(NamedTuple):
         return tracked, tracked if clean == asked else made(clean)
 
 
-class Found(NamedTuple):
-    """What pictures showed."""
+class FirstLook(NamedTuple):
+    """Scene and person found in pictures."""
 
-    scene: EmptyScene
+    scene: EmptyRoom
     tracked: Silhouettes
     clean: Silhouettes
     """For measuring."""
@@ -66,47 +66,47 @@ class Found(NamedTuple):
     """Whether there were silhouettes to measure a person in."""
 
 
-class Task(NamedTuple):
+class LookTask(NamedTuple):
     """A camera's pictures and what is wanted of them."""
 
     settings: SilhouetteSettings
     region: tuple[slice, slice] | None
     """Rows and columns where the person may be; None for all."""
-    fit: Fit | None
+    fit: SizesFrom | None
     """None if no person is to be measured."""
 
 
-def scene_of(pictures: Sequence[Image]) -> EmptyScene | None:
+def scene_of(pictures: Sequence[Image]) -> EmptyRoom | None:
     """The empty scene behind what moves in pictures (H, W, 3) or (H, W); None where nothing moves, or all of them."""
     recovered = recover_scene(pictures) if len(pictures) >= LEAST_FRAMES else None
-    return None if recovered is None or recovered.doubt is not None else EmptyScene([recovered.picture], recovered.covered, True)
+    return None if recovered is None or recovered.doubt is not None else EmptyRoom([recovered.picture], recovered.covered, True)
 
 
-def look(task: Task, pictures: Sequence[tuple[float, Image]], earlier: EmptyScene | None = None, since: float = -np.inf,
-         before: tuple[Picture, Silhouettes] | None = None) -> Found:
+def look(task: LookTask, pictures: Sequence[tuple[float, Image]], earlier: EmptyRoom | None = None, since: float = -np.inf,
+         before: tuple[Picture, Silhouettes] | None = None) -> FirstLook:
     """The scene of pictures and their times (s), and the person in the moments from `since` on. `earlier`: the scene so far, kept if it
     was seen empty while a person is tracked, and if these pictures show none; `before`: the body and the silhouettes so far, to compare."""
     images = [image for _, image in pictures]
     known = earlier is not None and not earlier.recovered and before is not None
-    scene = (None if known else scene_of(images)) or earlier or EmptyScene(images)
+    scene = (None if known else scene_of(images)) or earlier or EmptyRoom(images)
     tracked, clean = scene.silhouettes(task, images)
     frames = [CameraFrame(time, image, None) for time, image in pictures if time >= since] if task.fit else []
     seen = [(frame, mask) for frame in frames if may_be_person(mask := clean(frame)) and not unfit(mask)]
     seen = [seen[k] for k in evenly_spread(len(seen), MEASURED)] if len(seen) >= FEWEST else []
-    found = _measured(Found(scene, tracked, clean, None), task, [mask for _, mask in seen])
+    found = _measured(FirstLook(scene, tracked, clean, None), task, [mask for _, mask in seen])
     if before is None or found.fit is None:
         return found
     picture, so_far = before
     return found._replace(before=float(np.median([search_turned(picture, so_far(frame)).overlap for frame, _ in seen])))
 
 
-def look_at(task: Task, masks: Sequence[Mask], scene: EmptyScene, film: Sequence[Image]) -> Found:
+def look_at(task: LookTask, masks: Sequence[Mask], scene: EmptyRoom, film: Sequence[Image]) -> FirstLook:
     """The person in masks (H, W) before a known scene; `film`: some pictures of them, for the noise and the blur of outlines."""
-    return _measured(Found(scene, *scene.silhouettes(task, film), None), task, masks)
+    return _measured(FirstLook(scene, *scene.silhouettes(task, film), None), task, masks)
 
 
-def _measured(found: Found, task: Task, masks: Sequence[Mask]) -> Found:
-    """What was found, and the person in masks (H, W), if one fits."""
+def _measured(found: FirstLook, task: LookTask, masks: Sequence[Mask]) -> FirstLook:
+    """The first look, with the person in masks (H, W), if one fits."""
     if task.fit is None or not masks:
         return found
     found = found._replace(tried=True)

@@ -23,7 +23,7 @@ STILL = 0.1
 APART = 0.25
 """Age of that earlier silhouette, seconds."""
 MEASURED = 6
-"""Number of silhouettes of a person who stands still from which they are measured."""
+"""Number of silhouettes of a still person from which they are measured."""
 MOVING = 3.0
 """Seconds in the picture after which a person is measured, whatever they do."""
 
@@ -88,7 +88,7 @@ def unfit(mask: Mask) -> str:
     return ""
 
 
-Result = TypeVar("Result")
+Returned = TypeVar("Returned")
 
 
 _RUNNING = weakref.WeakSet[threading.Thread]()
@@ -102,12 +102,12 @@ def _wait() -> None:
         thread.join(ENDING)
 
 
-def in_background(task: Callable[[], Result]) -> Callable[[], Result | None]:
+def in_background(task: Callable[[], Returned]) -> Callable[[], Returned | None]:
     """Start a task in a daemon thread; returns a function that returns the result, or None while it is not ready.
 
     That function raises the task's error.
     """
-    done: list[Result] = []
+    done: list[Returned] = []
     failed: list[BaseException] = []
 
     def run() -> None:
@@ -116,7 +116,7 @@ def in_background(task: Callable[[], Result]) -> Callable[[], Result | None]:
         except BaseException as error:
             failed.append(error)
 
-    def result() -> Result | None:
+    def result() -> Returned | None:
         if failed:
             raise failed[0]
         return done[0] if done else None

@@ -16,9 +16,9 @@ from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.live.display.listener import LiveListener
+from shadowpuppet.live.display.view import LiveListener
 from shadowpuppet.live.interrupt import Stop
-from shadowpuppet.live.stream.outlet import Outlets, Subject
+from shadowpuppet.live.stream.outlet import Outlets, StreamSubject
 from shadowpuppet.motion.body_animation import base_in_world
 from shadowpuppet.motion.motion import Motion, MotionFrame
 
@@ -53,7 +53,7 @@ def play_run(folder: str | Path, outlets: Outlets, listener: LiveListener | None
                 break
             if np.isfinite(motion.poses[n]).all() and np.abs(played.bases[n] - base).max() > MOVED:
                 base = played.bases[n]
-                outlets.begin(Subject(played.body, base, played.height, 0.0 if _is_world(base) else None))
+                outlets.begin(StreamSubject(played.body, base, played.height, 0.0 if np.abs(base - np.eye(4)).max() < UNMOVED else None))
             outlets.follow(frame, max(clock() - due, 0.0))
             given += 1
             listener.advance(given)
@@ -94,5 +94,3 @@ def _frames(motion: Motion, loop: bool) -> Iterator[tuple[int, MotionFrame]]:
                                  cost=float(motion.cost[n]), overlap=float(motion.overlap[n]), limb_status=motion.limb_status[n].tolist())
 
 
-def _is_world(base: Array) -> bool:
-    return bool(np.abs(base - np.eye(4)).max() < UNMOVED)

@@ -12,7 +12,7 @@ import numpy as np
 
 from shadowpuppet.pipeline.rig import NEAR
 from shadowpuppet.video import Image
-from shadowpuppet.video.capture import Capture, Newest
+from shadowpuppet.video.capture import CameraCapture, Newest
 from shadowpuppet.video.live_source import Feed, Snapshot
 
 RECENT = 16
@@ -129,12 +129,12 @@ class _Member(Newest[Snapshot]):
 
 
 class RigCapture:
-    """Reads several feeds within its `with` block; has the interface of `Capture`."""
+    """Reads several feeds within its `with` block; has the interface of `CameraCapture`."""
 
     def __init__(self, feeds: Sequence[Feed], delays: Sequence[float] = ()) -> None:
         """Reading starts with the `with` block; `delays`: seconds from a picture's capture to its arrival, already taken off the feeds'
         times; none if left out."""
-        self.captures = [Capture(feed, _Member(self, n)) for n, feed in enumerate(feeds)]
+        self.captures = [CameraCapture(feed, _Member(self, n)) for n, feed in enumerate(feeds)]
         self.newest = Newest[SnapshotSet]()
         self._pairing, self._adding = Pairing([feed.rate for feed in feeds], delays or (0.0,) * len(feeds)), threading.Lock()
         self._open = ExitStack()

@@ -15,8 +15,8 @@ from shadowpuppet.camera.mask import Seen, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array, evenly_spread
-from shadowpuppet.live.base_session import Images, LiveSession, Masks, Outcome, scaled
-from shadowpuppet.live.first_look import EmptyScene, Task, scene_of
+from shadowpuppet.live.base_session import LiveSession, Masks, Pictures, StepResult, scaled
+from shadowpuppet.live.first_look import EmptyRoom, LookTask, scene_of
 from shadowpuppet.live.phases import NOBODY, BackgroundCollector
 from shadowpuppet.live.rig_capture import SnapshotSet
 from shadowpuppet.live.session import COUNTDOWN, FIRST_REFINED, LAST_REFINED
@@ -37,16 +37,16 @@ from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 from shadowpuppet.video import Image
 
 STEP_IN = "step in between the cameras and move a little"
-Scene = tuple[EmptyScene, Silhouettes]
+LearntRoom = tuple[EmptyRoom, Silhouettes]
 """A camera's empty scene, and the silhouettes before it."""
 
 
-def _found_scenes(films: Sequence[list[Image]], task: Task) -> list[Scene]:
+def _found_scenes(films: Sequence[list[Image]], task: LookTask) -> list[LearntRoom]:
     """The scenes of each camera's pictures."""
-    return _before([scene_of(film) or EmptyScene(film) for film in films], task, films)
+    return _before([scene_of(film) or EmptyRoom(film) for film in films], task, films)
 
 
-def _before(scenes: Iterable[EmptyScene], task: Task, films: Sequence[list[Image]]) -> list[Scene]:
+def _before(scenes: Iterable[EmptyRoom], task: LookTask, films: Sequence[list[Image]]) -> list[LearntRoom]:
     """Scenes, and silhouettes before them; pictures of a scene that was recovered show the person, too."""
     return [(scene, scene.silhouettes(task, film if scene.recovered else [])[0]) for scene, film in zip(scenes, films)]
 
@@ -74,13 +74,13 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
         self._share = SharedShadows(self._worked)
         self._without = dict[int, str]()
         """Cameras whose pictures cannot be used now, by index, and why."""
-        self._found_again: Callable[[], list[Scene] | None] | None = None
+        self._found_again: Callable[[], list[LearntRoom] | None] | None = None
         self._due, self._between = np.inf, FIRST_REFINED
         given = self.scene if self.scene and all(self.scene) else None
         self.begin_learning()
         self.begin_waiting()
         if given is not None:
-            self._learnt(_before(map(EmptyScene, given), self._task, [[]] * len(given)))
+            self._learnt(_before(map(EmptyRoom, given), self._task, [[]] * len(given)))
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
@@ -137,14 +137,14 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
         self._first: list[tuple[float, Masks]] = []
         self._hint = STEP_IN
 
-    def _learn(self, shot: SnapshotSet, images: Images) -> Outcome:
+    def _learn(self, shot: SnapshotSet, images: Pictures) -> StepResult:
         ready = [image is not None and collector.see(shot.captured, image) for collector, image in zip(self._collectors, images)]
         if all(ready):
             films = [[image for _, image in collector.pictures.kept] for collector in self._collectors]
             self.phase, self._measured = "measuring", self.work(partial(_found_scenes, films, self._task))
-        return Outcome(self._view(images))
+        return StepResult(self._view(images))
 
-    def _learnt(self, found: Sequence[Scene]) -> None:
+    def _learnt(self, found: Sequence[LearntRoom]) -> None:
         self._seen_before(found)
         self._due, self._between, self._found_again = self.clock() + FIRST_REFINED, FIRST_REFINED, None
         if self.subject:
@@ -152,12 +152,12 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
         else:
             self.phase = "waiting"
 
-    def _seen_before(self, found: Sequence[Scene]) -> None:
+    def _seen_before(self, found: Sequence[LearntRoom]) -> None:
         """Use new silhouettes before the scenes."""
         self.scene = [[] if scene.recovered else scene.pictures for scene, _ in found]
         self._segment = [silhouettes.segmented for _, silhouettes in found]
 
-    def _look_again(self, now: float, images: Images, fits: bool) -> bool:
+    def _look_again(self, now: float, images: Pictures, fits: bool) -> bool:
         """From time to time find the scenes that were not seen empty again in all pictures so far. Whether they were, while the body does
         not fit: a person who left the place where they stood at first leaves a hole in the scene."""
         for collector, image in zip(self._collectors, images):
@@ -176,7 +176,7 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
             self._seen_before(found)
         return not fits
 
-    def _track(self, shot: SnapshotSet, images: Images) -> Outcome:
+    def _track(self, shot: SnapshotSet, images: Pictures) -> StepResult:
         outcome = super()._track(shot, images)
         status = outcome.frame.status if outcome.frame is not None else "lost"
         if self._look_again(shot.captured, images, status == "tracked") and status in BLANK:
@@ -185,11 +185,11 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
         return outcome
 
     @property
-    def _task(self) -> Task:
-        """What is wanted of the pictures at first: silhouettes."""
-        return Task(self.options.silhouette, None, None)
+    def _task(self) -> LookTask:
+        """Task for the first pictures: silhouettes."""
+        return LookTask(self.options.silhouette, None, None)
 
-    def _wait(self, shot: SnapshotSet, images: Images) -> Outcome:
+    def _wait(self, shot: SnapshotSet, images: Pictures) -> StepResult:
         if self._look_again(shot.captured, images, False):
             self.begin_waiting()
         masks = self._see(shot, images).masks
@@ -199,7 +199,7 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
             self.begin_waiting()
         if self._first and shot.captured - self._first[0][0] >= max(OPENING, self.settings.still):
             self.phase, self._measured = "measuring", self.work(self._fitting())
-        return Outcome(self._view(images, masks))
+        return StepResult(self._view(images, masks))
 
     def _fitting(self) -> Callable[[], MultiviewSubject | TrackingError]:
         """A task that measures the person in the first seconds; it returns, rather than raises, the error if there is no person."""
@@ -216,11 +216,11 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
 
         return tried
 
-    def _measure(self, shot: SnapshotSet, images: Images) -> Outcome:
+    def _measure(self, shot: SnapshotSet, images: Pictures) -> StepResult:
         """Check whether the fit is ready."""
-        found: MultiviewSubject | TrackingError | list[Scene] | None = self._measured()
+        found: MultiviewSubject | TrackingError | list[LearntRoom] | None = self._measured()
         if found is None:
-            return Outcome(self._view(images, self._see(shot, images).masks if self._segment else ()))
+            return StepResult(self._view(images, self._see(shot, images).masks if self._segment else ()))
         if isinstance(found, list):
             self._learnt(found)
         elif isinstance(found, TrackingError):
@@ -228,17 +228,17 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
             self.phase, self._hint = "waiting", f"no person's shape: {STEP_IN}"
         else:
             self._begin_tracking(found)
-        return Outcome(self._view(images))
+        return StepResult(self._view(images))
 
     def _begin_tracking(self, subject: TrackedSubject[MultiviewState, HullObservation, Before]) -> None:
         super()._begin_tracking(subject)
         self._watch = RigWatch(len(self.full))
 
-    def _scaled(self, shot: SnapshotSet) -> Images:
+    def _scaled(self, shot: SnapshotSet) -> Pictures:
         return tuple(None if image is None or n in self._without else scaled(image, camera)
                      for n, (image, camera) in enumerate(zip(shot.images, self._worked)))
 
-    def _see(self, shot: SnapshotSet, images: Images) -> Seen:
+    def _see(self, shot: SnapshotSet, images: Pictures) -> Seen:
         found = [None if image is None else segment(CameraFrame(shot.captured, image, None))
                  for segment, image in zip(self._segment, images)]
         codes = tuple(None if each is None else colour_codes(each.image) for each in found)
@@ -250,8 +250,8 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
             collector.wait()
         self._first.clear()
 
-    def _shown(self, images: Images, masks: Masks, frame: MotionFrame | None) -> dict[str, Any]:
-        """The fields image and pictures of a `View`. The image is a grid of all cameras, because the display shows a single picture."""
+    def _shown(self, images: Pictures, masks: Masks, frame: MotionFrame | None) -> dict[str, Any]:
+        """The fields image and pictures of a `SessionState`. The image is a grid of all cameras: a display shows a single picture."""
         if not images:
             return {}
         measured = self.subject.pictures if isinstance(self.subject, MultiviewSubject) else ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,24 +14,24 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, RecordingError, SettingsError, choices
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.io.recording import Recording, View
-from shadowpuppet.live.base_session import Images
+from shadowpuppet.live.base_session import Pictures
 from shadowpuppet.live.phases import KEPT
 from shadowpuppet.live.rig_capture import RigCapture, SnapshotSet
 from shadowpuppet.live.settings import LiveSettings
-from shadowpuppet.pipeline.footage import CameraFrame, Footage, camera_footage, cut
+from shadowpuppet.pipeline.footage import Footage, camera_footage, cut
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig, open_rig, synchronized_frames
 from shadowpuppet.silhouette.background import sample_frames
 from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.video import FrameSource, Image, Size, open_frames
-from shadowpuppet.video.capture import Capture
+from shadowpuppet.video.capture import CameraCapture
 from shadowpuppet.video.live_source import ADDRESS, Feed, corrected, film_feed, open_feed
 
 
 class RigSources(NamedTuple):
     """Several opened cameras, with calibration, empty scenes and the person's height."""
 
-    capture: RigCapture | Capture
+    capture: RigCapture | CameraCapture
     cameras: tuple[Camera, ...]
     """The cameras for pictures of full size."""
     sizes: tuple[Size, ...]
@@ -49,6 +50,12 @@ def is_rig(source: str) -> bool:
     """Whether a source stands for several cameras: names separated by commas, or the folder of a recording."""
     path = Path(source)
     return (path / "video").is_dir() if path.exists() else len(_parts(source)) > 1
+
+
+def sources_of(source: str) -> tuple[Path, ...]:
+    """The films and folders that a source names, or the recording; none for cameras and streams."""
+    path = Path(source)
+    return (path,) if os.path.exists(path) else tuple(Path(part) for part in _parts(source) if os.path.exists(part))
 
 
 def open_rig_sources(options: Options, settings: LiveSettings) -> RigSources:
@@ -111,7 +118,7 @@ def _films(rig: Rig, options: Options, settings: LiveSettings) -> RigSources:
     scenes = [_scene(footage) for footage in rig.footage]
     cameras = tuple(footage.view.camera for footage in rig.footage)
     sizes = tuple(camera.size for camera in rig.cameras)
-    return RigSources(Capture(film_set_feed(rig, settings.speed)), cameras, sizes, rig.rate * settings.speed, False,
+    return RigSources(CameraCapture(film_set_feed(rig, settings.speed)), cameras, sizes, rig.rate * settings.speed, False,
                       scenes if all(scenes) else [], rig.recording.subject.height)
 
 
@@ -129,13 +136,11 @@ class _FilmSet:
     size: Size
     rate: float
 
-    def __iter__(self) -> Iterator[tuple[float, Images]]:
-        for each in synchronized_frames(self.rig, [_no_mask] * len(self.rig.footage)):
+    def __iter__(self) -> Iterator[tuple[float, Pictures]]:
+        for each in synchronized_frames(self.rig, [lambda _: Segmented(np.zeros((0, 0), bool))] * len(self.rig.footage)):
             yield each.time, each.images
 
 
-def _no_mask(frame: CameraFrame) -> Segmented:
-    return Segmented(np.zeros((0, 0), bool))
 
 
 def film_set_feed(rig: Rig, speed: float = 1.0) -> Feed:
@@ -145,6 +150,6 @@ def film_set_feed(rig: Rig, speed: float = 1.0) -> Feed:
 
     def read() -> Iterator[SnapshotSet]:
         for shot in feed.read():
-            yield SnapshotSet(shot.captured, cast("Images", shot.image), shot.shown)
+            yield SnapshotSet(shot.captured, cast("Pictures", shot.image), shot.shown)
 
     return replace(feed, read=cast(Any, read))

@@ -12,33 +12,34 @@ from typing import Any
 
 import numpy as np
 
+from shadowpuppet.errors import SettingsError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.io.inputs.inputs import inputs_of
 from shadowpuppet.io.person import write_person
 from shadowpuppet.io.run import read_run
-from shadowpuppet.io.run_writer import RunWriter, write_metrics
-from shadowpuppet.live.base_session import Given, LiveSession, Outcome
-from shadowpuppet.live.display.listener import LiveListener
-from shadowpuppet.live.display.view import Display
+from shadowpuppet.io.run_writer import RunWriter
+from shadowpuppet.live.base_session import Given, LiveSession, StepResult
+from shadowpuppet.live.display.view import Display, LiveListener
 from shadowpuppet.live.interrupt import Stop
 from shadowpuppet.live.phases import in_background
 from shadowpuppet.live.recorder import Recorder
 from shadowpuppet.live.rig_capture import RigCapture
 from shadowpuppet.live.rig_session import RigSession
-from shadowpuppet.live.rig_sources import is_rig, open_rig_sources
-from shadowpuppet.live.session import Session
+from shadowpuppet.live.rig_sources import is_rig, open_rig_sources, sources_of
+from shadowpuppet.live.session import CameraSession
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.sources import empty_scene, known_person, lens
-from shadowpuppet.live.stream.outlet import Outlets, Subject
+from shadowpuppet.live.stream.outlet import Outlets, StreamSubject
 from shadowpuppet.live.timing import Timing
 from shadowpuppet.live.warm_up import warm_up
 from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.metrics import evaluate
-from shadowpuppet.pipeline.options import Options, plain_options
+from shadowpuppet.pipeline.options import PATHS, Options, plain_options
 from shadowpuppet.pipeline.stages.smooth import smooth_run
 from shadowpuppet.pipeline.subject import FittedPerson, average_body, joint_names
 from shadowpuppet.settings import validate
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.video.capture import Capture
+from shadowpuppet.video.capture import CameraCapture
 from shadowpuppet.video.live_source import corrected, open_feed
 from shadowpuppet.video.network_stream import without_secrets
 
@@ -48,6 +49,13 @@ IDLE = 0.05
 
 class _Nobody(Exception):
     """Nobody was tracked, so there is no run to keep."""
+
+
+def check_number(options: Options) -> None:
+    """Raise `SettingsError` for several people."""
+    if (options.people or 1) > 1:
+        raise SettingsError(f"people: found {options.people} for a live session, expected 1: `track` follows several, also in what "
+                            "--record has kept")
 
 
 @one_blas_thread()
@@ -63,6 +71,7 @@ def run_live(folder: str | Path, options: Options | None = None, settings: LiveS
     options, settings = options or Options(), settings or LiveSettings()
     listener, display = listener or LiveListener(), display or Display()
     outlets = outlets or Outlets()
+    check_number(options)
     several = is_rig(settings.camera)
     body = average_body((options.multiview if several else options.tracker).body)
     told = validate(LiveSettings, asdict(settings) | {"camera": without_secrets(settings.camera)})
@@ -71,17 +80,17 @@ def run_live(folder: str | Path, options: Options | None = None, settings: LiveS
             "settings": plain_options(options), "live": told}
     folder = Path(folder)
     try:
-        with outlets, RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info) as run:
+        inputs = inputs_of(sources_of(settings.camera), {name: getattr(options, name) for name in PATHS})
+        with outlets, RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, inputs) as run:
             session = _Live(run, options, settings, listener, display, clock, outlets)
             session.run()
             smooth_run(run, session.subjects, options, listener, run.motion, session.session.leans)
+            cameras = session.session.worked_cameras
+            found = evaluate(run.motion, camera=None if several else cameras[0], cameras=len(cameras))
+            run.metrics |= found
     except _Nobody:
         return None
-    motion = read_run(folder).motion
-    cameras = session.session.worked_cameras
-    metrics = read_run(folder).metrics | evaluate(motion, camera=None if several else cameras[0], cameras=len(cameras))
-    write_metrics(folder, metrics)
-    return metrics
+    return read_run(folder).metrics | found
 
 
 class _Live:
@@ -97,19 +106,19 @@ class _Live:
         self.subjects = list[tuple[int, FittedPerson]]()
         """Measured persons, each with its first frame."""
 
-    def _single(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
+    def _single(self) -> tuple[LiveSession, CameraCapture | RigCapture, float, bool]:
         """The session of one camera, its reader, its frames/s, and whether it is live (not a film)."""
         options, settings = self.options, self.settings
         person = known_person(options)
         feed = open_feed(settings.camera, rate=settings.rate, speed=settings.speed, start=options.start, end=options.end)
         (feed,) = corrected([feed], settings.delay)
         full = lens(options, feed.size)
-        session = Session(options, settings, np.random.default_rng(options.seed), self.clock, Timing(feed.rate), in_background,
+        session = CameraSession(options, settings, np.random.default_rng(options.seed), self.clock, Timing(feed.rate), in_background,
                           full=full, watchdog=CameraWatchdog(feed.name, feed.size, feed.live), person=person,
                           scene=empty_scene(options, full))
-        return session, Capture(feed), feed.rate, feed.live
+        return session, CameraCapture(feed), feed.rate, feed.live
 
-    def _several(self) -> tuple[LiveSession, Capture | RigCapture, float, bool]:
+    def _several(self) -> tuple[LiveSession, CameraCapture | RigCapture, float, bool]:
         """The session of several cameras, their reader, their frame sets/s, and whether they are live (not films)."""
         sources = open_rig_sources(self.options, self.settings)
         watchdogs = tuple(CameraWatchdog(camera.name, size, sources.live) for camera, size in zip(sources.cameras, sources.sizes))
@@ -180,7 +189,7 @@ class _Live:
         for frame, age in given:
             self.outlets.follow(frame, age)
 
-    def _keep(self, outcome: Outcome) -> None:
+    def _keep(self, outcome: StepResult) -> None:
         for camera in self.session.asks_again(self.clock()):
             self.capture.again(camera)
         if outcome.frame is None:
@@ -202,10 +211,10 @@ class _Live:
         assert self.session.subject is not None
         return self.session.subject
 
-    def _stream_subject(self) -> Subject:
+    def _stream_subject(self) -> StreamSubject:
         """The measured person, for the outlets."""
         base, floor = self.session.placed()
-        return Subject(self._person.body, base, self._person.person.height, floor)
+        return StreamSubject(self._person.body, base, self._person.person.height, floor)
 
     def _write_beside(self) -> None:
         """Write person.toml and calibration.toml; called again whenever the person was measured again."""
@@ -213,7 +222,7 @@ class _Live:
         write_person(self.run_.folder / "person.toml", self._person.person)
         write_calibration(self.run_.folder / "calibration.toml", self.session.cameras)
 
-    def _tell(self, outcome: Outcome) -> None:
+    def _tell(self, outcome: StepResult) -> None:
         """Report changes to the listener, each once."""
         view, now = outcome.view, self.clock()
         if said := self.outlets.trouble():

@@ -14,8 +14,8 @@ from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.camera.mask import Seen
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.person import Person
-from shadowpuppet.live.base_session import Images, LiveSession, Masks, Outcome, scaled
-from shadowpuppet.live.first_look import EmptyScene, Found, Task, look, look_at
+from shadowpuppet.live.base_session import LiveSession, Masks, Pictures, StepResult, scaled
+from shadowpuppet.live.first_look import EmptyRoom, FirstLook, LookTask, look, look_at
 from shadowpuppet.live.phases import BackgroundCollector, StandStillDetector, unfit
 from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.motion import MotionFrame
@@ -36,11 +36,11 @@ FIRST_REFINED, LAST_REFINED = 3.0, 60.0
 """Seconds of tracking after which scene and person are found again in all pictures so far; doubled each time, up to the last."""
 GAIN = 0.01
 """Overlap that a person found again must gain."""
-Value = TypeVar("Value")
+CameraValue = TypeVar("CameraValue")
 
 
 @dataclass(eq=False, kw_only=True)
-class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
+class CameraSession(LiveSession[Snapshot, State, ColouredMask, Before]):
     """A live session with one camera."""
 
     full: Camera
@@ -61,14 +61,14 @@ class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
         self._recent: list[Image] = []
         self._clean: Silhouettes | None = None
         self._segment: Segment | None = None
-        self._scene: EmptyScene | None = None
-        self._refined: Callable[[], Found | None] | None = None
+        self._scene: EmptyRoom | None = None
+        self._refined: Callable[[], FirstLook | None] | None = None
         """Gives the result of a new look at the pictures so far; None while there is none."""
         self._due, self._between, self._since = np.inf, FIRST_REFINED, -np.inf
         self.begin_learning()
         self._wait_again()
         if self.scene:
-            scene = EmptyScene(self.scene)
+            scene = EmptyRoom(self.scene)
             self._seen_before(scene, *scene.silhouettes(self._task(None), []))
             self.phase = "waiting"
 
@@ -125,16 +125,16 @@ class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
         self._still, self._recent = StandStillDetector(self.settings.still), []
         self._still.message = message or self._still.message
 
-    def _learn(self, shot: Snapshot, images: Images) -> Outcome:
+    def _learn(self, shot: Snapshot, images: Pictures) -> StepResult:
         if self._collector.see(shot.captured, only(images)):
             task = self._task(self.person)
             task = task if self.fit is None else task._replace(fit=None)
             self.phase, self._measured = "measuring", self.work(partial(look, task, list(self._collector.pictures.kept)))
-        return Outcome(self._view(images))
+        return StepResult(self._view(images))
 
-    def _wait(self, shot: Snapshot, images: Images) -> Outcome:
+    def _wait(self, shot: Snapshot, images: Pictures) -> StepResult:
         if self._taken():
-            return Outcome(self._view(images))
+            return StepResult(self._view(images))
         masks = self._see(shot, images).masks
         self._recent = [*self._recent[-7:], only(images)]
         self._collector.pictures.add(shot.captured, only(images))
@@ -146,13 +146,13 @@ class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
             self._measured = self.work(partial(look_at, task, ready, self._scene, self._recent))
         elif not self.scene:
             self._look_again(shot.captured)
-        return Outcome(self._view(images, masks))
+        return StepResult(self._view(images, masks))
 
-    def _measure(self, shot: Snapshot, images: Images) -> Outcome:
+    def _measure(self, shot: Snapshot, images: Pictures) -> StepResult:
         """Check whether the task is ready."""
-        found: Found | None = self._measured()
+        found: FirstLook | None = self._measured()
         if found is None:
-            return Outcome(self._view(images, self._see(shot, images).masks))
+            return StepResult(self._view(images, self._see(shot, images).masks))
         self._seen_before(found.scene, found.tracked, found.clean)
         self._due, self._between = shot.captured + FIRST_REFINED, FIRST_REFINED
         if found.fit is not None:
@@ -162,9 +162,9 @@ class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
         else:
             self.phase = "waiting"
             self._wait_again("no person's shape: stand whole in the picture, facing the camera" if found.tried else "")
-        return Outcome(self._view(images))
+        return StepResult(self._view(images))
 
-    def _track(self, shot: Snapshot, images: Images) -> Outcome:
+    def _track(self, shot: Snapshot, images: Pictures) -> StepResult:
         lagging = self._lagging
         given = () if not self._taken() or lagging is None else self._aged(lagging.rest())
         outcome = super()._track(shot, images)
@@ -174,14 +174,14 @@ class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
         self._look_again(shot.captured)
         return outcome
 
-    def _task(self, known: Person | PersonEstimate | None) -> Task:
-        """What is wanted of pictures: silhouettes, and the person, or only the place of one whose sizes are `known`."""
+    def _task(self, known: Person | PersonEstimate | None) -> LookTask:
+        """Task for pictures: silhouettes, and the person's sizes and place, or the place alone if their sizes are `known`."""
         again = self._since > -np.inf
         sizes, height = (known.sizes, known.height) if known else (None, None)
         height = self.options.height or height if isinstance(known, Person | None) else height
         find = partial(find_person, self.rng.spawn(1)[0], self.camera, height=height, distance=None if again else self.options.distance,
                        sizes=sizes, body=self.options.tracker.body, settings=self.options.initialization)
-        return Task(self.options.silhouette, self._region, find)
+        return LookTask(self.options.silhouette, self._region, find)
 
     def _look_again(self, now: float) -> None:
         """From time to time begin a new look at the pictures so far, for the person and for a scene that was not seen empty."""
@@ -215,14 +215,14 @@ class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
         source = str(self.options.person) if self.options.person else "proportions, refined on moments of the session"
         self._begin_tracking(MonocularSubject.of(fit, self.camera, self.options.tracker, source, 1 / self.timing.interval))
 
-    def _seen_before(self, scene: EmptyScene, tracked: Silhouettes, clean: Silhouettes) -> None:
+    def _seen_before(self, scene: EmptyRoom, tracked: Silhouettes, clean: Silhouettes) -> None:
         """Use new silhouettes before a scene."""
         self._scene, self._clean, self._segment = scene, clean, tracked.segmented
 
     def _scaled(self, shot: Snapshot) -> tuple[Image, ...]:
         return (scaled(shot.image, self.camera),)
 
-    def _see(self, shot: Snapshot, images: Images) -> Seen:
+    def _see(self, shot: Snapshot, images: Pictures) -> Seen:
         """The silhouette (H, W); before tracking a clean one, as measuring a person needs."""
         clean = None if self._clean is None else self._clean.segmented
         segment = self._segment if self.phase == "tracking" else clean
@@ -236,7 +236,7 @@ class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
             self._collector.wait()
         self._still.wait()
 
-    def _shown(self, images: Images, masks: Masks, frame: MotionFrame | None) -> dict[str, Any]:
+    def _shown(self, images: Pictures, masks: Masks, frame: MotionFrame | None) -> dict[str, Any]:
         picture = self.subject.picture if isinstance(self.subject, MonocularSubject) else None
         return {"image": only(images) if images else None, "mask": masks[0] if masks else None, "picture": picture,
                 "pictures": () if picture is None else (picture,)}
@@ -252,8 +252,8 @@ class Session(LiveSession[Snapshot, State, ColouredMask, Before]):
         return self._still.message if self.phase == "waiting" else looking, None
 
 
-def only(every: Sequence[Value | None]) -> Value:
-    """What the only camera has."""
+def only(every: Sequence[CameraValue | None]) -> CameraValue:
+    """The value of the only camera."""
     (value,) = every
     assert value is not None
     return value

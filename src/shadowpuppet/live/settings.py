@@ -35,7 +35,7 @@ class LiveSettings:
     learn: Annotated[float, Field(ge=0.3, le=600)] = 3.0
     """Duration, in seconds, in which the empty scene is found: behind who moves, if there is a person."""
     still: Annotated[float, Field(ge=0.1, le=60)] = 1.0
-    """Seconds after which a person who stands still is measured; one who moves is after three."""
+    """Seconds after which a still person is measured; a moving one is measured after three."""
     show: Literal["auto", "browser", "none", "window", "viewer"] = "auto"
     """Where the session is shown. browser: on a page, and its address is printed; auto: the same, and the page is opened if there is a
     screen."""

@@ -12,7 +12,7 @@ from shadowpuppet.live.phases import KEPT
 from shadowpuppet.pipeline.footage import worked_size
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette.background import sample_frames
-from shadowpuppet.video import Image, Size, open_frames
+from shadowpuppet.video import Image, Size, fitted, open_untimed
 
 USUAL_FOV = 65.0
 """Field of view (degrees) of a webcam or a phone along the longer side of its pictures, assumed if none is given."""
@@ -56,8 +56,9 @@ def empty_scene(options: Options, full: Camera) -> list[Image]:
     """Pictures of the empty scene from `options.background`, of the working size; empty without it. Raises `RecordingError`."""
     if options.background is None:
         return []
-    size = open_frames(options.background).size
+    scene = open_untimed(options.background)
+    size = scene.size
     if size != full.size:
         raise RecordingError(f"{options.background}: found the empty scene of {size[0]} x {size[1]} pixels, expected {full.size[0]} x "
                              f"{full.size[1]} as the camera's: it must come from the same camera at the same setting")
-    return sample_frames((frame.image for frame in open_frames(options.background, size=worked_size(size, options.max_size))), KEPT)
+    return sample_frames((frame.image for frame in fitted(scene, worked_size(size, options.max_size))), KEPT)

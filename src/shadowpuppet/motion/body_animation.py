@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from shadowpuppet.body.shapes import Body, Quads
+from shadowpuppet.body.whole_body import Three
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, align
 from shadowpuppet.motion.animation import Animation
@@ -21,7 +22,6 @@ JOINT_TOLERANCE = 1e-4
 """Largest distance (m) of a run's joints from its body's with one transform for all frames."""
 MIN_END = 0.01
 """Smallest length of a bone's end, metres."""
-Three = tuple[float, float, float]
 
 
 @dataclass(frozen=True)

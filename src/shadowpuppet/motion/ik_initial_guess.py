@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body.angles import angles_over_time
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import SIDES
-from shadowpuppet.geometry import Array, rotation_about, unit
+from shadowpuppet.geometry import Array, rotation_about, shortest_rotation, unit
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.plausibility import leftward, midpoint, positions_of
 from shadowpuppet.motion.synchronization import nearest
@@ -71,12 +71,7 @@ def _upright(left: Array, up: Array) -> Array:
 
 def _swing(parent: Array, along: Array, up: int) -> Array:
     """Parents' frames (T, 3, 3) rotated the shortest way so that z (`up` 1), or -z (-1), points along unit vectors (T, 3)."""
-    z = up * parent[:, :, 2]
-    axis, cosine = np.cross(z, along), (z * along).sum(1)
-    K = np.zeros((len(along), 3, 3))
-    K[:, [2, 0, 1], [1, 2, 0]], K[:, [1, 2, 0], [2, 0, 1]] = axis, -axis
-    turn = np.eye(3) + K + K @ K / np.maximum(1 + cosine, 1e-3)[:, None, None]
-    return turn @ parent
+    return shortest_rotation(up * parent[:, :, 2], along, 1e-3) @ parent
 
 
 def _limb(parent: Array, along: Array, bend: Array) -> Array:

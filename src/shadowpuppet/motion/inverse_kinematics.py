@@ -104,7 +104,7 @@ def fit_poses(joints: JointTable, body: str = "anatomical", sizes: BoneSizes | N
     return problem.result(*problem.solve(initial_poses(start, table), person.to_array()))
 
 
-class _Linear(NamedTuple):
+class _Equations(NamedTuple):
     """Normal equations of a step: blocks of the poses (T, D, D), margin (T, D, S), corner (S, S), right-hand sides (T, D), (S,)."""
 
     A: Array
@@ -178,7 +178,7 @@ class _Problem:
     def _places(self, body: Body, poses: Array) -> Array:
         return body.points(poses, names=self.table.names)
 
-    def _equations(self, poses: Array, values: Array) -> _Linear:
+    def _equations(self, poses: Array, values: Array) -> _Equations:
         """The normal equations at poses and sizes: J' W J and J' W r of the joints, and the pulls."""
         T, D, S = *poses.shape, len(self.free)
         A, B, C = np.zeros((T, D, D)), np.zeros((T, D, S)), np.diag(self.hold)
@@ -202,7 +202,7 @@ class _Problem:
         moved = self.smooth * np.diff(poses, axis=0)
         g[:-1] += moved
         g[1:] -= moved
-        return _Linear(A, B, C, g, h)
+        return _Equations(A, B, C, g, h)
 
     def _slopes(self, body: Body, poses: Array, at: Array) -> Array:
         """Derivatives (T, J, 3, D) of the joints' positions `at` (T, J, 3)."""
@@ -227,7 +227,7 @@ def _at_limits(poses: Array, downhill: Array, low: Array, high: Array) -> NDArra
     return ((poses <= low) & (downhill < 0)) | ((poses >= high) & (downhill > 0))
 
 
-def _solve_step(equations: _Linear, smooth: Array, damping: float, held: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _solve_step(equations: _Equations, smooth: Array, damping: float, held: NDArray[np.bool_]) -> tuple[Array, Array]:
     """The step of poses (T, D) and sizes (S,): poses are eliminated along the chain, then sizes solved for (Schur complement)."""
     (T, D), S, free = equations.g.shape, len(equations.h), ~held
     A = equations.A * free[:, :, None] * free[:, None, :]

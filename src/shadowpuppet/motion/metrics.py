@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.body.bones import BONES
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import ShadowPuppetError, choices
 from shadowpuppet.geometry import Array
@@ -20,8 +20,8 @@ UPPER_JOINTS = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "r
 """Joints compared for a run without legs."""
 LIMB_JOINTS = tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right"))
 """Joints compared for a run with legs."""
-GROUPS = {"upper": UPPER_JOINTS, "limbs": LIMB_JOINTS, "humaneva": ("pelvis", "neck", "head", *LIMB_JOINTS)}
-"""Named groups of joints; HumanEva's error is the mean distance over its 15 (Sigal, Balan and Black 2010)."""
+GROUPS = {"upper": UPPER_JOINTS, "limbs": LIMB_JOINTS}
+"""Named groups of joints."""
 LOST_ERROR, FAR_ERROR = 0.5, 0.3
 """Error (m) counted for a missing joint, so that leaving out bad frames never helps; and error (m) from which a joint counts as far
 off."""
@@ -92,7 +92,7 @@ def joint_errors(run: JointTable, truth: JointTable, joints: Sequence[str] | Non
 
 
 def default_joints(run: JointTable, truth: JointTable) -> tuple[str, ...]:
-    """`LIMB_JOINTS` for a run with legs, else `UPPER_JOINTS`; only those that both tables have."""
+    """`LIMB_JOINTS` for a run with legs, else `UPPER_JOINTS`; only joints that both tables have."""
     group = LIMB_JOINTS if any(name.endswith(("_hip", "_knee", "_ankle")) for name in run.names) else UPPER_JOINTS
     return tuple(name for name in group if name in run.names and name in truth.names)
 
@@ -125,7 +125,7 @@ def accelerations(table: JointTable) -> Array:
 
 def jitter(table: JointTable) -> float:
     """Root mean square acceleration of joints, m/s^2; not a number without three consecutive known frames. It includes the motion's own
-    acceleration and grows with the frame rate: compare it with the truth's, or with that of another run of the film."""
+    acceleration and grows with the frame rate: compare it with the truth's, or with another run's of the film."""
     squares = (accelerations(table) ** 2).sum(2)
     squares = squares[np.isfinite(squares)]
     return float(np.sqrt(squares.mean())) if squares.size else np.nan

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shadowpuppet.errors import SettingsError, choices
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, shortest_rotation
 from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.mesh import Mesh
 
@@ -47,7 +47,7 @@ def rest_turns(animation: Animation, raised: float) -> Array:
         outward = 1.0 if side == "left" else -1.0
         along = _bone(animation, j)
         wanted = np.array([outward * np.sin(raised), -np.cos(raised), 0.0])
-        turns[j] = turns[parent] if along is None else _turn(along, wanted)
+        turns[j] = turns[parent] if along is None else shortest_rotation(along, wanted, 1e-9)
     return turns
 
 
@@ -57,10 +57,3 @@ def _bone(animation: Animation, joint: int) -> Array | None:
     along = np.array(animation.ends.get(joint, np.zeros(3))) if child is None else animation.offsets[child]
     length = float(np.linalg.norm(along))
     return along / length if length > 1e-6 else None
-
-
-def _turn(a: Array, b: Array) -> Array:
-    """The shortest rotation (3, 3) of one unit vector (3,) to another."""
-    axis, cosine = np.cross(a, b), float(a @ b)
-    K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + K + K @ K / (1 + cosine)

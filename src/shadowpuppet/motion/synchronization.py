@@ -33,8 +33,7 @@ def match(times: ArrayLike, truth_times: ArrayLike) -> tuple[NDArray[np.int64], 
     is the truth's median one; a truth of one frame accepts any."""
     times, truth_times = np.asarray(times, float), np.asarray(truth_times, float)
     index = nearest(times, truth_times)
-    half = 0.5 * np.median(np.diff(truth_times)) if len(truth_times) > 1 else np.inf
-    return index, np.abs(times[index] - truth_times) <= half + 1e-9
+    return index, np.abs(times[index] - truth_times) <= 0.5 * step_of(truth_times) + 1e-9
 
 
 def step_of(times: ArrayLike) -> float:

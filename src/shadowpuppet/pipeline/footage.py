@@ -20,7 +20,7 @@ from shadowpuppet.io.picture_sizes import differ_by_padding
 from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.names import composed
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.video import FrameSource, Image, camera_number, fitted, open_frames
+from shadowpuppet.video import FrameSource, Image, camera_number, fitted, open_frames, open_untimed
 from shadowpuppet.video.frames import ROUNDING, Wanted
 from shadowpuppet.video.moments import span_of
 from shadowpuppet.video.seeking import Seeker
@@ -129,8 +129,8 @@ class Footage:
 
         Raises `RecordingError` if their size is not the film's, with or without the padding of H.264.
         """
-        frames, (width, height) = open_frames(source), self.view.camera.size
-        frames = open_masks(source, mask_kind(source, self.label)) if masks else frames
+        width, height = self.view.camera.size
+        frames = open_masks(source, mask_kind(source, self.label)) if masks else open_untimed(source)
         if frames.size != (width, height) and not differ_by_padding(frames.size, (width, height)):
             raise RecordingError(f"{source}: found {what} of {frames.size[0]} x {frames.size[1]} pixels, expected {width} x {height} "
                                  "as the film: it must come from the same camera at the same setting")

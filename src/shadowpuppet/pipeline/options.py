@@ -93,6 +93,8 @@ class Options:
     """Picture or film of the empty scene in place of the recording's own; one camera only."""
     masks: bool = False
     """Use the recording's ready silhouettes (masks/) instead of segmenting the film."""
+    people: Annotated[int, Field(ge=1, le=6)] | None = None
+    """Number of people to follow, 1 to 6, with one camera or live 1; by default they are counted. Anybody else is ignored."""
     label: Annotated[int, Field(ge=0)] | None = None
     """The person's label where ready silhouettes are label images, such as PNG with a palette; by default the only one."""
     region: Annotated[tuple[int, int, int, int], BeforeValidator(_corners)] | None = None
@@ -190,6 +192,8 @@ def check_used(options: Options, several: bool) -> None:
     idle = [name for key in (OF_ONE if several else OF_SEVERAL) for name in _changed(key, usual[key], now[key])]
     if idle:
         warn(f"no effect with {cameras}: {', '.join(idle)}")
+    if options.label is not None and not options.masks:
+        warn("no effect without ready silhouettes (--masks): label")
 
 
 def _changed(name: str, usual: Any, now: Any) -> Iterator[str]:

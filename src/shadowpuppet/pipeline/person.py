@@ -13,7 +13,7 @@ from shadowpuppet.body.models import WHOLE
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.body.upper_body import TWIST
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.colour_codes import Codes
+from shadowpuppet.camera.colour_codes import ColourCode
 from shadowpuppet.camera.drawing import overlay_frame
 from shadowpuppet.camera.mask import Mask, Seen, may_be_person
 from shadowpuppet.camera.rasterize import Picture
@@ -82,7 +82,7 @@ class ColouredMask(NamedTuple):
 
     mask: Mask
     """The silhouette (H, W)."""
-    codes: Codes | None
+    codes: ColourCode | None
     """Coarse colours; None: not known."""
 
 

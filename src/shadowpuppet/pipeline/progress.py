@@ -17,7 +17,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, bounding_window
 from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.io.files.plain import for_json, plain
+from shadowpuppet.io.files.plain import json_text
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.motion_files import check_unit, read_truth
 from shadowpuppet.io.person import Person, write_person
@@ -200,11 +200,6 @@ def write_beside(folder: Path, look: Look | RigLook, rig: Rig, person: Person | 
     write_calibration(folder / "calibration.toml", [footage.view.camera for footage in rig.footage])
     if person is not None:
         write_person(folder / "person.toml", person)
-
-
-def json_text(value: object) -> str:
-    """Plain values, arrays and dataclasses as JSON; null for numbers that are not finite."""
-    return json.dumps(for_json(plain(value, "value")), indent=1, ensure_ascii=False, allow_nan=False)
 
 
 def is_same_look(before: str, now: str) -> bool:

@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.camera.colour_codes import Codes, thinned
+from shadowpuppet.camera.colour_codes import ColourCode, thinned
 from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.rig import FrameSet, Rig
 
 SHARED = ("height", "distance", "fov", "calibration", "camera", "background", "masks", "region", "start", "end", "max_size",
-          "every", "silhouette")
+          "every", "people", "silhouette")
 """Options on which survey and silhouettes depend."""
 LIMIT = 256_000_000
 """Greatest size of the kept silhouettes, bytes: about half an hour of one camera's 25 frames/s at 320 x 240."""
@@ -94,7 +94,7 @@ def _unpacked(packed: Packed | None) -> Mask | None:
     return np.unpackbits(np.frombuffer(zlib.decompress(bits), np.uint8), count=int(np.prod(shape))).reshape(shape).view(np.bool_)
 
 
-def _codes(mask: Mask | None, packed: bytes | None) -> Codes | None:
+def _codes(mask: Mask | None, packed: bytes | None) -> ColourCode | None:
     """Colours in a mask (H, W), and 0 elsewhere."""
     if mask is None or packed is None:
         return None

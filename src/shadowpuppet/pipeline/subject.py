@@ -21,7 +21,7 @@ from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.errors import Finding
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person
-from shadowpuppet.motion.contact.floor import under_feet
+from shadowpuppet.motion.contact.contact import under_feet
 from shadowpuppet.motion.motion import BLANK, Motion, MotionFrame
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.silhouette.added import BesideBody

@@ -12,7 +12,7 @@ import numpy as np
 from shadowpuppet.errors import TrackingError, warn
 from shadowpuppet.io.people import person_folder
 from shadowpuppet.io.run import read_run
-from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter
+from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter, write_metrics
 from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.options import Options
@@ -87,11 +87,16 @@ def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: L
     found = people.track(*rngs, smooth_run)
     if not found:
         raise TrackingError(f"{survey.look.recording}: nobody is found in the silhouettes of {survey.census.number} people")
-    if len(found) < survey.census.number:
+    if len(found) < min(survey.census.number, options.people or survey.census.number):
         warn(f"{survey.look.recording}: {survey.census.number} people were counted, {len(found)} could be followed: a person whom few "
              "cameras show whole, or who is seen for less than a second, is not")
-    writer.info["people"] = len(found)
     first = read_run(person_folder(writer.folder, min(found)))
+    if len(found) == 1:
+        ((number, metrics),) = found.items()
+        writer.adopt(people.writers[number])
+        write_metrics(writer.folder, metrics := people.metrics | metrics)
+        return Summary(writer.folder, first.motion, metrics, survey.look)
+    writer.info["people"] = len(found)
     return Summary(writer.folder, first.motion, people.metrics | {"people": found}, survey.look)
 
 

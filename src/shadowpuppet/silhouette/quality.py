@@ -29,7 +29,7 @@ WARN_HOLE_AREA = 0.1
 WARN_HOLES = 10
 
 
-ANEW = "the program that made the masks is unsure; make them anew, or leave --masks out"
+REMEDY = "the program that made the masks is unsure; make them again, or leave --masks out"
 """What is to be done about masks of another program."""
 
 
@@ -100,14 +100,14 @@ class MaskQuality:
 
     def _incomplete(self, cut_off: int) -> Iterator[Finding]:
         if self.empty:
-            why = ("or the masks miss them; cut the film, or make the masks anew" if self.ready else
+            why = ("or the masks miss them; cut the film, or make the masks again" if self.ready else
                    "or does not differ from the background; cut the film, or set another method")
             yield Finding(f"the silhouette is empty in {self._share(self.empty)} of the frames, first in frame {self.first_empty}: the "
                           f"person is out of the picture, {why}",
                           f"nobody seen in {self._share(self.empty)} of frames: cut them",
                           HARMFUL if self.empty > 0.3 * self.frames else NOTED, {"frames": self.frames, "empty": self.empty})
         if self.full:
-            why, short = (("make the masks anew", f"masks cover all at frame {self.first_full}: make them anew") if self.ready else
+            why, short = (("make the masks again", f"masks cover all at frame {self.first_full}: make them again") if self.ready else
                           ("the light changed or the camera moved; cut the film there, or fix camera and exposure",
                            f"light or camera changed at frame {self.first_full}: --end {self.first_full}f"))
             yield Finding(f"nearly all of the picture is silhouette in {self._share(self.full)} of the frames, first in frame "
@@ -121,10 +121,10 @@ class MaskQuality:
                              "more pixels", "person is too small in the picture: go nearer", HARMFUL, percent=100 * self.area)
 
     def _unsteady(self) -> Iterator[Finding]:
-        remedy = ANEW if self.ready else (
+        remedy = REMEDY if self.ready else (
                   "the person hardly differs from the background, or was taken for it where it was made from the film; give a picture "
                   "of the empty scene, more light, or other clothes")
-        short = "parts of the person vanish: " + ("make the masks anew" if self.ready else "film the empty scene")
+        short = "parts of the person vanish: " + ("make the masks again" if self.ready else "film the empty scene")
         if self.area_jumps > WARN_JUMPS:
             yield Finding(f"the area of the silhouette changes by over {_percent(AREA_JUMP)} at once in {_percent(self.area_jumps)} of the "
                           f"frames, as parts are lost and found: {remedy}", short, HARMFUL, {"percent": 100 * self.area_jumps})
@@ -132,21 +132,21 @@ class MaskQuality:
             yield Finding(f"the area of the silhouette changes by {_percent(self.area_change)} from frame to frame: {remedy}", short,
                           HARMFUL, {"percent": 100 * self.area_change})
         if self.flicker > WARN_FLICKER:
-            why = ANEW if self.ready else ("noise in dim light, a lamp's flicker, or silhouettes that are not cleaned; use more light, or "
-                                           "--silhouette.clean")
+            why = (REMEDY if self.ready else
+                   "noise in dim light, a lamp's flicker, or silhouettes that are not cleaned; use more light, or --silhouette.clean")
             yield Finding(f"pixels worth {_percent(self.flicker)} of the person's area flicker from frame to frame: {why}",
-                          f"outlines flicker: {'make the masks anew' if self.ready else 'use more light'}", HARMFUL,
+                          f"outlines flicker: {'make the masks again' if self.ready else 'use more light'}", HARMFUL,
                           {"percent": 100 * self.flicker})
 
     def _unclean(self) -> Iterator[Finding]:
         if self.speck_area > WARN_SPECK_AREA:
-            why, short = (("make the masks of the person alone", "masks hold more than the person: make them anew") if self.ready else
+            why, short = (("make the masks of the person alone", "masks hold more than the person: make them again") if self.ready else
                           ("noise, shadow or another person; use --silhouette.clean, or keep others out of the picture",
                            "noise, shadows or others beside the person: keep them out"))
             yield Finding(f"the silhouette has {self.specks:.1f} parts beside the person, {_percent(self.speck_area)} of its area: {why}",
                           short, HARMFUL, {"parts": self.specks, "percent": 100 * self.speck_area})
         if self.hole_area > WARN_HOLE_AREA or self.holes > WARN_HOLES:
-            why, short = ((ANEW, "masks have holes: make them anew") if self.ready else
+            why, short = ((REMEDY, "masks have holes: make them again") if self.ready else
                           ("clothes like the background, or noise; try another method, or other clothes",
                            "silhouettes have holes: wear other colours than the background"))
             yield Finding(f"the silhouette has {self.holes:.1f} holes, {_percent(self.hole_area)} of its area: {why}", short, HARMFUL,

@@ -9,7 +9,6 @@ from shadowpuppet.synthetic.collection import (
     around,
     demo_ring_spec,
     demo_spec,
-    humaneva,
     named_specs,
     proving_ground,
     proving_rings,
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 __all__ = ["Bystander", "Fault", "Gesture", "Mannequin", "Obstacle", "Ring", "Scene", "Spec", "Viewpoint", "around", "demo_ring_spec",
-           "demo_spec", "humaneva", "named_specs", "proving_ground", "proving_rings", "read_spec", "resting", "spec_from", "spec_text",
+           "demo_spec", "named_specs", "proving_ground", "proving_rings", "read_spec", "resting", "spec_from", "spec_text",
            "synthesize"]
 
 

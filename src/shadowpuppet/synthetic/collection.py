@@ -10,7 +10,7 @@ import numpy as np
 from shadowpuppet.synthetic.furniture import Obstacle
 from shadowpuppet.synthetic.movement.resting import PostureName
 from shadowpuppet.synthetic.movement.script import Gesture
-from shadowpuppet.synthetic.person.mannequin import Kind, Mannequin
+from shadowpuppet.synthetic.person.mannequin import Mannequin, PersonKind
 from shadowpuppet.synthetic.spec import Scene, Spec
 from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.synthetic.viewpoint import Ring, Viewpoint
@@ -30,7 +30,7 @@ def demo_ring_spec() -> Spec:
 
 
 PAPER = "wave_hands 3.6, bend_aside 3.6, bow_forward 2.8"
-PROVING = (
+PROVING: tuple[tuple[str, PersonKind, int, str, float, float, float, float, float], ...] = (
     # name, kind and seed of the body, gestures, distance (m), fov (degrees), pitch (degrees), noise (grey levels), turn (degrees)
     ("man_paper", "man", 1, PAPER, 2.0, 60, 0, 2.5, 0),
     ("woman_paper", "woman", 2, PAPER, 2.0, 60, 0, 2.5, 0),
@@ -58,25 +58,23 @@ def proving_ground(shift: int = 0) -> tuple[Spec, ...]:
 
     They are fixed; make the n-th with `numpy.random.default_rng([seed, n])`, its own seed being (0, n). Level cameras stand at 0.9 of the
     stature, so that the picture cuts the legs; pitched ones higher or lower, so that the person stays in the picture. With a `shift` they
-    have other people, clothes and rooms, to test on what was chosen; their seeds are (shift, n).
+    have other people, clothes and rooms, to test the choices; their seeds are (shift, n).
     """
-    return tuple(_proof(n, shift, *row) for n, row in enumerate(PROVING))
+    specs = []
+    for n, (name, kind, seed, gestures, distance, fov, pitch, noise, turn) in enumerate(PROVING):
+        body = Mannequin.draw(np.random.default_rng(seed + shift), kind)
+        height = 0.9 * body.stature + distance * float(np.tan(np.radians(pitch)))
+        view = Viewpoint(fov_deg=fov, height=height, distance=distance, pitch_deg=pitch)
+        specs.append(Spec(name=name, body=body, motion=parse_gestures(gestures), cameras=(view,), turn_deg=turn,
+                          scene=Scene(clothing=n + shift, room=n + shift, noise=noise), seed=(shift, n)))
+    return tuple(specs)
 
 
-def _proof(n: int, shift: int, name: str, kind, seed: int, gestures: str, distance: float, fov: float, pitch: float, noise: float,
-           turn: float) -> Spec:
-    body = Mannequin.draw(np.random.default_rng(seed + shift), kind)
-    height = 0.9 * body.stature + distance * float(np.tan(np.radians(pitch)))
-    view = Viewpoint(fov_deg=fov, height=height, distance=distance, pitch_deg=pitch)
-    return Spec(name=name, body=body, motion=parse_gestures(gestures), cameras=(view,), turn_deg=turn,
-                scene=Scene(clothing=n + shift, room=n + shift, noise=noise), seed=(shift, n))
-
-
-def _person(kind: Kind, seed: int, bmi: float | None = None, age: float | None = None) -> Mannequin:
+def _person(kind: PersonKind, seed: int, bmi: float | None = None, age: float | None = None) -> Mannequin:
     return Mannequin.draw(np.random.default_rng(seed), kind, bmi=bmi, age=age)
 
 
-AROUND = (
+AROUND: tuple[tuple[str, PersonKind, int, str, float], ...] = (
     # name, kind and seed of the body, gestures, distance of the seven cameras (m)
     ("ring_upper", "woman", 4, "wave_hands 4, reach 5, random 6", 3.5),
     ("ring_walking", "man", 21, "walk 7", 4.8),
@@ -89,47 +87,17 @@ def around() -> tuple[Spec, ...]:
     """Recordings of seven cameras around a person, 640 x 480 at 60 frames/s, as long as those of HumanEva."""
     specs = []
     for n, (name, kind, seed, gestures, radius) in enumerate(AROUND):
-        body = Mannequin.draw(np.random.default_rng(seed), kind)  # pyright: ignore[reportArgumentType]
+        body = Mannequin.draw(np.random.default_rng(seed), kind)
         ring = Ring(count=7, radius=radius, jitter=0.5, seed=n, size=(640, 480), distortion=(-0.09, 0.05, 0.0, 0.0))
         scene = Scene(clothing=30 + n, room=30 + n)
         specs.append(Spec(name=name, body=body, motion=parse_gestures(gestures), ring=ring, scene=scene, rate=60, seed=(1, n)))
     return tuple(specs)
 
 
-HUMANEVA: tuple[tuple[str, Kind, int, str, float, int, float, float, tuple[int, int]], ...] = (
-    # name, kind and seed of the body, gestures, seconds of them before the film, its frames (Ni 2008, Table I), distance (m) and field of
-    # view (degrees) of the cameras, seeds of clothes and room
-    ("humaneva_walking", "man", 21, "walk 11", 2.0, 433, 4.8, 48, (92, 92)),
-    ("humaneva_jogging", "woman", 22, "jog 10", 2.0, 393, 4.8, 48, (81, 81)),
-    ("humaneva_boxing", "man", 23, "box 10", 1.2, 377, 4.2, 42, (91, 92)),
-)
-TRAINING_FRAMES = 100
-"""Number of training frames in Ni 2008, Table I."""
-
-
-def humaneva() -> tuple[Spec, ...]:
-    """Recordings like those of Ni 2008's experiments (VI): seven cameras of 640 x 480 at 60 frames/s; 433 frames of walking, 393 of jogging
-    and 377 of boxing; and 100 training frames of the same person's joints.
-
-    HumanEva itself needs a licence (papers/humaneva). Here people move by published angles, not by motion capture, and the training motion
-    is another performance of the same gestures.
-    """
-    return tuple(_humaneva(n, *row) for n, row in enumerate(HUMANEVA))
-
-
-def _humaneva(n: int, name: str, kind: Kind, seed: int, gestures: str, begin: float, frames: int, radius: float,
-              fov: float, look: tuple[int, int]) -> Spec:  # fmt: skip
-    body, scene = Mannequin.draw(np.random.default_rng(seed), kind), Scene(clothing=look[0], room=look[1])
-    ring = Ring(count=7, radius=radius, fov_deg=fov, jitter=0.5, seed=10 + n, size=VGA, distortion=PLAIN_LENS)
-    return Spec(name=name, body=body, motion=parse_gestures(gestures), begin=begin, frames=frames, training_frames=TRAINING_FRAMES,
-                ring=ring, scene=scene, rate=60, tells="height", seed=(3, n))
-
-
 VGA, WIDE_LENS, PLAIN_LENS = (640, 480), (-0.22, 0.06, 0.0, 0.0), (-0.09, 0.05, 0.0, 0.0)
-Row = tuple[str, Mannequin, str, str | None, Ring, dict[str, Any], float]
 
 
-def _rings() -> tuple[Row, ...]:
+def _rings() -> tuple[tuple[str, Mannequin, str, str | None, Ring, dict[str, Any], float], ...]:
     """One row per recording; a function, because checking a ring with a distorted lens loads OpenCV."""
     return (
         # name, body, gestures, those of the training (None: the same, "": none), cameras, scene, pictures a second
@@ -171,7 +139,7 @@ def proving_rings() -> tuple[Spec, ...]:
     )  # fmt: skip
 
 
-RESTING: tuple[tuple[str, Kind, int, PostureName, str, str, int], ...] = (
+RESTING: tuple[tuple[str, PersonKind, int, PostureName, str, str, int], ...] = (
     # name, kind and seed of the body, posture, gestures, chair (none, known: in the empty scene too, new: in the film only), cameras
     ("sits", "man", 61, "seated", "reach 4, wave_hands 3", "known", 1),
     ("sits_on_new", "man", 61, "seated", "reach 4, wave_hands 3", "new", 1),
@@ -195,10 +163,11 @@ def resting() -> tuple[Spec, ...]:
     walk = Gesture(motion="walk", seconds=11, path="line", size=5.0)
     passes = Spec(name="comes_and_goes", body=body, motion=(walk,), turn_deg=90, scene=Scene(clothing=68, room=68, empty_seconds=2.0),
                   cameras=(Viewpoint(height=0.9 * body.stature, distance=2.4),), tells="height", seed=(4, len(RESTING)))
-    return (*(_resting(n, *row) for n, row in enumerate(RESTING)), passes)
+    return (*(_resting(n) for n in range(len(RESTING))), passes)
 
 
-def _resting(n: int, name: str, kind: Kind, seed: int, posture: PostureName, gestures: str, chair: str, cameras: int) -> Spec:
+def _resting(n: int) -> Spec:
+    name, kind, seed, posture, gestures, chair, cameras = RESTING[n]
     body = _person(kind, seed)
     seat = Obstacle(kind="chair", seat=True, enters=0.0 if chair == "new" else None)
     look = {"clothing": seed, "room": seed, "empty_seconds": 2.0, "obstacles": (seat,)[: chair != "none"]}
@@ -212,5 +181,5 @@ def _resting(n: int, name: str, kind: Kind, seed: int, posture: PostureName, ges
 
 def named_specs() -> dict[str, Spec]:
     """All specs by name."""
-    chosen = (*proving_ground(), *around(), *humaneva(), *proving_rings(), *resting())
+    chosen = (*proving_ground(), *around(), *proving_rings(), *resting())
     return {spec.name: spec for spec in (demo_spec(), demo_ring_spec(), *chosen)}

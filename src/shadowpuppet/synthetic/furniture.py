@@ -14,7 +14,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.settings import STRICT
 from shadowpuppet.synthetic.compositing import FAR, Layer
 
-Seconds = Annotated[float, Field(ge=0, le=3600)]
+FilmSeconds = Annotated[float, Field(ge=0, le=3600)]
 Coordinate = Annotated[float, Field(ge=-10, le=10)]
 MIN_DISTANCE = 0.25
 """Least distance of an obstacle from the person's place, metres."""
@@ -39,10 +39,10 @@ class Obstacle:
     seat: bool = False
     """Whether it is the chair on which the person sits: it gets their place, direction and seat height, and `ahead`, `left`, `turn_deg` and
     `scale` have no effect."""
-    enters: Seconds | None = None
+    enters: FilmSeconds | None = None
     """Time of the film at which it appears, from one frame to the next, seconds; 0: there from the first frame on, but not in the film of
     the empty scene. By default it is there in both."""
-    leaves: Seconds | None = None
+    leaves: FilmSeconds | None = None
     """Time of the film at which it disappears, seconds; by default it stays."""
 
     def __post_init__(self) -> None:

@@ -8,7 +8,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.synthetic.compositing import FAR, Layer
 from shadowpuppet.synthetic.person.clothes import Clothes
-from shadowpuppet.synthetic.person.kinematics import Figure
+from shadowpuppet.synthetic.person.kinematics import PosedBody
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.person.surface import GROUPS, MATERIALS, Surface
 
@@ -46,7 +46,7 @@ class PersonRenderer:
         grid = np.stack(np.meshgrid(np.arange(2 * width), np.arange(2 * height)), -1) / 2.0 - 0.25
         return _unit(self.camera.rays(grid) @ inverse(self.camera.T_camera_world)[:3, :3].T)
 
-    def draw(self, figure: Figure, index: int) -> Layer:
+    def draw(self, figure: PosedBody, index: int) -> Layer:
         """The figure in its posture `index`."""
         from shadowpuppet.synthetic import _ray_marching
 
@@ -55,12 +55,12 @@ class PersonRenderer:
         _ray_marching.colour_surface(*traced, depth, near, self.colours, self.lights, self.stripes, EDGE_SAMPLES, picture, alpha)
         return Layer(picture, alpha, depth)
 
-    def mask(self, figure: Figure, index: int) -> np.ndarray:
+    def mask(self, figure: PosedBody, index: int) -> np.ndarray:
         """The exact silhouette (H, W) of the figure in its posture `index`, as `draw` has it, without colours."""
         return self._traced(figure, index)[1] < FAR
 
-    def _traced(self, figure: Figure, index: int) -> tuple[tuple, Array, np.ndarray]:
-        """What the kernels need of the figure in a posture; depth (H, W) of its surface, and the nearest part (H, W)."""
+    def _traced(self, figure: PosedBody, index: int) -> tuple[tuple, Array, np.ndarray]:
+        """The kernels' arguments for the figure in a posture; depth (H, W) of its surface, and the nearest part (H, W)."""
         from shadowpuppet.synthetic import _ray_marching
 
         s, (width, height), eye = self.surface, self.camera.size, self.camera.centre
@@ -77,8 +77,8 @@ class PersonRenderer:
         _ray_marching.find_surface(*traced, depth, near)
         return traced, depth, near
 
-    def _joins(self, figure: Figure, index: int) -> Array:
-        """Where each of `GROUPS` blends into the trunk, and the radius, of shape (5, 4), metres."""
+    def _joins(self, figure: PosedBody, index: int) -> Array:
+        """Place at which each of `GROUPS` blends into the trunk, and the radius, of shape (5, 4), metres."""
         names = [JOINTS.index(name) for name in ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")]
         assert len(names) == len(GROUPS)
         elbow, wrist = (figure.joints[index, JOINTS.index(name)] for name in ("left_elbow", "left_wrist"))
@@ -91,11 +91,11 @@ def _unit(v: Array) -> Array:
     return np.ascontiguousarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
 
 
-def _covering(origin: Array, axes: Array, s: Surface, count: int = 4) -> Array:
-    """Spheres (P, count, 4) that cover each part with its caps and half its blend."""
+def _covering(origin: Array, axes: Array, s: Surface) -> Array:
+    """Spheres (P, 4, 4) that cover each part with its caps and half its blend."""
     low, high = -s.caps[:, 0], s.length + s.caps[:, 1]
-    step = (high - low) / count
-    along = low[:, None] + step[:, None] * (np.arange(count) + 0.5)
+    step = (high - low) / 4
+    along = low[:, None] + step[:, None] * (np.arange(4) + 0.5)
     centres = origin[:, None] + axes[:, None, :, 2] * along[..., None]
     radius = np.hypot(s.radius, step / 2) + 0.5 * s.blend + 0.005
     return np.concatenate([centres, np.broadcast_to(radius[:, None, None], (*along.shape, 1))], -1)

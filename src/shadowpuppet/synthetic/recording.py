@@ -15,13 +15,11 @@ from shadowpuppet.errors import RecordingError, SettingsError, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.faults.camera_faults import CameraFaults
 from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEAD_SECONDS, LEVEL, TAIL_SECONDS, posture, trunk
-from shadowpuppet.synthetic.person.kinematics import Figure, pose
+from shadowpuppet.synthetic.person.kinematics import PosedBody, pose
 from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
 from shadowpuppet.synthetic.spec import Bystander, Scene, Spec
 from shadowpuppet.synthetic.spec_file import SPEC_FILE, seed_of, write_spec
 from shadowpuppet.synthetic.truth import SPEED_STEP, Soles, soles, write_lines, write_truth
-
-Progress = Callable[[int, int], None]
 
 REFERENCES = {"front_t_pose": LEVEL, "side_arms_hanging": HANGING_ARMS | trunk(turn=90), "front_arms_t_pose": LEVEL}
 """The postures of Liu 2011's initialisation (Algorithm 1): O1, O2, O3."""
@@ -31,7 +29,8 @@ FAR_BELOW = 1e5
 """Place of an absent person, metres below the floor: less than a pixel, and no shadow."""
 
 
-def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None = None, tell: Progress | None = None) -> Path:
+def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None = None,
+               tell: Callable[[int, int], None] | None = None) -> Path:
     """Write the recording that `spec` describes into `folder`, created if missing, and return its path.
 
     rng: by default a generator of the spec's seed. tell: called after each frame with the numbers of frames done and in all. The same
@@ -40,7 +39,7 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     the motion is too short or a fault is impossible; warns if obstacles hide nothing, and if a
     camera never sees the person.
     """
-    folder, rng = Path(folder), np.random.default_rng(spec.seed) if rng is None else rng
+    folder, rng, tell = Path(folder), np.random.default_rng(spec.seed) if rng is None else rng, tell or (lambda *_: None)
     cameras = [view.camera() for view in spec.views()]
     _folders(folder, "video", *["background"][: spec.scene.empty_seconds > 0], "masks", *["people"][: len(spec.scene.bystanders)])
     seed = seed_of(rng)
@@ -65,7 +64,7 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     hidden = 0
     for n, (camera, noise, faults) in enumerate(zip(cameras, for_noise.spawn(len(cameras)), wrong)):
         studio = SceneRenderer(spec, camera, noise, others, wall, faults)
-        hides, seen = _shoot(folder, spec, studio, figure, _part(tell, n * len(times), len(cameras) * len(times)))
+        hides, seen = _shoot(folder, spec, studio, figure, lambda done, n=n: tell(n * len(times) + done, len(cameras) * len(times)))
         hidden += hides
         if not seen:
             warn(f"{folder}: camera {camera.name!r}: sees nothing of the person in any picture")
@@ -76,7 +75,7 @@ def synthesize(spec: Spec, folder: str | Path, rng: np.random.Generator | None =
     return folder
 
 
-def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, Figure]:
+def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, PosedBody]:
     """Times (T,), seconds from the first frame, and the moving figure of `spec` at those times.
 
     Raises `SettingsError` if the motion is shorter than the film.
@@ -100,7 +99,7 @@ def covered_middle(spec: Spec) -> Array:
     return (places.min(0) + places.max(0)) / 2
 
 
-def feet_of(spec: Spec, times: Array, figure: Figure, rng: np.random.Generator) -> Soles:
+def feet_of(spec: Spec, times: Array, figure: PosedBody, rng: np.random.Generator) -> Soles:
     """The soles of `spec`'s figure at times (T,), seconds; rng: in the state before `perform`, so that the motion is the same."""
     from shadowpuppet.synthetic.movement.sequence import sequence_seconds
 
@@ -109,15 +108,15 @@ def feet_of(spec: Spec, times: Array, figure: Figure, rng: np.random.Generator) 
     return soles(spec.body, figure, moving, after - before)
 
 
-def _figure(spec: Spec, t: Array, rng: np.random.Generator) -> Figure:
+def _figure(spec: Spec, t: Array, rng: np.random.Generator) -> PosedBody:
     """The figure of `spec` at times `t` (T,) of its motion, seconds."""
     from shadowpuppet.synthetic.movement.sequence import animate
 
     return animate(spec.body, spec.motion, t, rng, spec.still, np.radians(spec.turn_deg), spec.posture)
 
 
-def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator, person: Figure | None = None) -> Figure:
-    """The figure of a bystander in `count` frames, at the bystander's place beside the `person`, who else is at the origin."""
+def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator, person: PosedBody | None = None) -> PosedBody:
+    """The figure of a bystander in `count` frames, at the bystander's place beside the `person`; None: beside the origin."""
     again = int(np.ceil(count / spec.rate / 3600))  # a gesture takes an hour at most
     length = count / spec.rate - (LEAD_SECONDS + TAIL_SECONDS if someone.from_start else 0.0)  # they begin and end together
     gestures = (replace(someone.motion, seconds=max(2.0, length / again)),) * again
@@ -132,7 +131,7 @@ def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Genera
     return figure._replace(joints=parts[0] + place, rotation=parts[1], origin=parts[2] + place, curl=parts[3])
 
 
-def _away(figure: Figure, absent: np.ndarray) -> Figure:
+def _away(figure: PosedBody, absent: np.ndarray) -> PosedBody:
     """The figure out of all cameras' sight in the frames, of shape (T,), in which it is `absent`."""
     if not absent.any():
         return figure
@@ -146,18 +145,14 @@ def _gone(someone: Bystander, times: Array) -> np.ndarray:
     return (begin <= times) & (times < end)
 
 
-def _wall(figure: Figure, others: list[Figure]) -> float:
+def _wall(figure: PosedBody, others: list[PosedBody]) -> float:
     """Least distance of the wall behind the origin, metres; 0 if all people stay in place: every wall is far enough for that."""
     people = [one.joints[..., :2] for one in (figure, *others)]
     behind, aside = max(float(one[..., 1].max()) for one in people), max(float(np.abs(one).max()) for one in people)
     return max(behind if others or behind > 1.15 else -0.4, aside if aside > 5.6 else -0.4) + 0.4
 
 
-def _part(tell: Progress | None, before: int, total: int) -> Callable[[int], None]:
-    return lambda done: tell(before + done, total) if tell is not None else None
-
-
-def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: Figure, tell: Callable[[int], None]) -> tuple[int, int]:
+def _shoot(folder: Path, spec: Spec, studio: SceneRenderer, figure: PosedBody, tell: Callable[[int], None]) -> tuple[int, int]:
     """Write a camera's films; returns the numbers of the person's hidden and visible pixels. tell: called with the frames done.
 
     After Ctrl-C the films end with the last frame made and can be used.

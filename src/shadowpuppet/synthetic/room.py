@@ -13,7 +13,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.synthetic import walls
 from shadowpuppet.synthetic.furniture import Furniture
-from shadowpuppet.synthetic.person.kinematics import Figure
+from shadowpuppet.synthetic.person.kinematics import PosedBody
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.spec import Scene
 
@@ -84,7 +84,7 @@ class Room:
                   for furniture in arrangements]
         return [one.reshape(height, 2, width, 2, 3).mean((1, 3)) for one in shaded]
 
-    def shaded(self, picture: Array, figure: Figure, index: int, *others: Figure) -> Array:
+    def shaded(self, picture: Array, figure: PosedBody, index: int, *others: PosedBody) -> Array:
         """One of the room's pictures (H, W, 3) with the shadows of the figure and of `others`."""
         import cv2
 

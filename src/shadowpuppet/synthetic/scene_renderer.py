@@ -15,9 +15,12 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.compositing import Layer, composite, composite_people, visible
 from shadowpuppet.synthetic.faults.camera_faults import CameraFaults
 from shadowpuppet.synthetic.person.clothes import Clothes
-from shadowpuppet.synthetic.person.dressed import dressed
-from shadowpuppet.synthetic.person.kinematics import Figure
+from shadowpuppet.synthetic.person.head import head
+from shadowpuppet.synthetic.person.kinematics import PosedBody
+from shadowpuppet.synthetic.person.limbs import arm, leg
 from shadowpuppet.synthetic.person.mannequin import Mannequin
+from shadowpuppet.synthetic.person.surface import Surface
+from shadowpuppet.synthetic.person.trunk import shoulders, trunk
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.room import Room, expose, lamp_brightness
 from shadowpuppet.synthetic.spec import Bystander, Spec
@@ -46,7 +49,7 @@ class Lit(NamedTuple):
     people: np.ndarray
     """Of shape (H, W), uint8, 0 or 255."""
     hidden: int
-class Place(NamedTuple):
+class EmptyStage(NamedTuple):
     """The scene without people, while the same obstacles are there."""
 
     room: Array
@@ -58,7 +61,7 @@ class Place(NamedTuple):
 class SceneRenderer:
     """Renders the scene of a spec as one camera sees it."""
 
-    def __init__(self, spec: Spec, camera: Camera, rng: np.random.Generator, others: Sequence[Figure] = (), least: float = 0.0,
+    def __init__(self, spec: Spec, camera: Camera, rng: np.random.Generator, others: Sequence[PosedBody] = (), least: float = 0.0,
                  faults: CameraFaults | None = None) -> None:
         """rng: for the noise; clothes and room have their own seeds in the spec.
 
@@ -80,10 +83,10 @@ class SceneRenderer:
         self.others = [(figure, self._of(bystander, camera)) for figure, bystander in zip(others, scene.bystanders, strict=True)]
         fine = self.renderer.fine_rays() if self.furniture else np.zeros((0, 0, 3))
         layers = [[now.layer(camera.centre, self.renderer.rays, fine, self.room.lights)] if now else [] for now in arrangements]
-        self._places = {now.things: Place(room, drawn) for now, room, drawn in zip(arrangements, self.room.pictures, layers)}
+        self._places = {now.things: EmptyStage(room, drawn) for now, room, drawn in zip(arrangements, self.room.pictures, layers)}
         self._length = 0.0
 
-    def place(self, seconds: float | None) -> Place:
+    def place(self, seconds: float | None) -> EmptyStage:
         """The place without people, `seconds` after the film's first frame; None: in the film of the empty scene."""
         return self._places[self.furniture.at(seconds).things]
 
@@ -96,23 +99,23 @@ class SceneRenderer:
         light = self.faults.cropped(composite(*self.place(None)))
         return self._exposed(light, (index - count) / self.spec.rate, None)
 
-    def take(self, figure: Figure, index: int) -> tuple[np.ndarray, np.ndarray]:
+    def take(self, figure: PosedBody, index: int) -> tuple[np.ndarray, np.ndarray]:
         """A frame (H, W, 3) BGR of posture `index` in the empty scene, without bystanders, and its exact mask (H, W), 0 or 255."""
         light, mask, *_ = self._lit(figure, index, None)
         return self._exposed(self.faults.cropped(light), 0.0, None), self.faults.cropped(mask)
 
-    def hides(self, figure: Figure) -> bool:
+    def hides(self, figure: PosedBody) -> bool:
         """Whether obstacles of the empty scene hide a part of the figure in its first posture."""
         return bool(self.place(None).things) and self._lit(figure, 0, None)[3] > 0
 
-    def film(self, figure: Figure, workers: int | None = None) -> Iterator[RenderedFrame]:
+    def film(self, figure: PosedBody, workers: int | None = None) -> Iterator[RenderedFrame]:
         """Frames of the film in order; `workers` threads (by default 2 to 8) draw ahead, the noise is drawn in order."""
         count = len(figure.joints)
         self._length = (count - 1) / self.spec.rate
         lights = ((one.light, one) for one in self._drawn(figure, workers or min(max(os.cpu_count() or 2, 2), 8)))
         return self.faults.timed(self._taken(light, one, index) for index, (light, one) in enumerate(self.faults.blurred(lights)))
 
-    def _drawn(self, figure: Figure, workers: int) -> Iterator[Lit]:
+    def _drawn(self, figure: PosedBody, workers: int) -> Iterator[Lit]:
         """All postures as the moved camera sees them."""
         from concurrent.futures import ThreadPoolExecutor
 
@@ -125,8 +128,8 @@ class SceneRenderer:
                     ahead.append(pool.submit(self._seen, figure, index + 2 * workers))
                 yield lit
 
-    def _seen(self, figure: Figure, index: int) -> Lit:
-        """A posture among the bystanders; what the moved camera sees of it."""
+    def _seen(self, figure: PosedBody, index: int) -> Lit:
+        """A posture among the bystanders, as the moved camera sees it."""
         light, mask, people, hidden = self._lit(figure, index, index / self.spec.rate)
         light, moved = self.faults.displaced(light, index), self.faults.displaced(mask, index)
         return Lit(light, moved, moved if people is mask else self.faults.displaced(people, index), hidden)
@@ -136,7 +139,7 @@ class SceneRenderer:
         there = np.uint8(not self.faults.is_black(index))
         return RenderedFrame(self._exposed(light, index / self.spec.rate, index), lit.mask * there, lit.people * there, lit.hidden)
 
-    def _lit(self, figure: Figure, index: int, seconds: float | None) -> Lit:
+    def _lit(self, figure: PosedBody, index: int, seconds: float | None) -> Lit:
         """Light, masks and number of hidden pixels, with the margin, `seconds` after the film's first frame; None: in the empty scene,
         without bystanders."""
         person = self.renderer.draw(figure, index)
@@ -161,6 +164,12 @@ class SceneRenderer:
         bright = lamp_brightness(scene, seconds, self._length)
         light = self.faults.lit(light if bright == 1 else bright * light, index, seconds)
         return expose(light, self.faults.noise(scene.noise, index), self.rng)[..., ::-1]
+
+
+def dressed(body: Mannequin, clothes: Clothes) -> Surface:
+    """The surface of `body` in `clothes`."""
+    left = [*arm(body, clothes), *leg(body, clothes)]
+    return Surface.of([*trunk(body, clothes), *shoulders(body, clothes), *head(body, clothes), *left, *(loft.mirrored() for loft in left)])
 
 
 def bystander_body(bystander: Bystander) -> Mannequin:

@@ -79,7 +79,7 @@ class Scene:
     """Compression of the films, H.264's constant rate factor: 0 is lossless but for half of the colour resolution, 18 hardly visible, 35
     coarse, 51 the worst."""
     obstacles: tuple[Obstacle, ...] = ()
-    """Things in the scene that hide what is behind them."""
+    """Obstacles in the scene."""
     bystanders: tuple[Bystander, ...] = ()
     """Other people."""
 
@@ -120,7 +120,7 @@ class Spec:
     scene: Scene = Scene()
     """Clothes, room and noise."""
     faults: tuple[Fault, ...] = ()
-    """What is wrong with the films' pictures."""
+    """Faults of the films' pictures."""
     rate: Annotated[float, Field(ge=1, le=240)] = 15.0
     """Frames per second."""
     turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0

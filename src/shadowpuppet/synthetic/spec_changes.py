@@ -92,7 +92,7 @@ class SpecChanges:
     people: Annotated[int, Field(ge=2, le=6)] | None = None
     """Number of people, 2 to 6, each with a body, clothes, motion and truth of their own."""
     together: Together | None = None
-    """What they do: walk round or past each other, dance on the spot, or shake hands; two people if --people does not say how many."""
+    """Their motion: walk round or past each other, dance on the spot, or shake hands; two people if --people does not say how many."""
     faults: str | None = None
     """Faults of the pictures: kind, amount, @begin-end in seconds, drift, cameras, such as "gain 1.3 @3-6, nudge 20 @4 cam2, black @5"; all
     but the kind may be left out."""
@@ -182,13 +182,9 @@ def parse_gestures(text: str, seconds: float | None = None, source: str = "motio
     if open_ and each < SHORTEST:
         raise SettingsError(f"{source}: found {seconds:g} seconds, of which {open_} gestures get {each:g} each, expected at least "
                             f"{SHORTEST:g}")
-    values = [_named(item[0]) | {"seconds": float(item[1]) if len(item) == 2 else each} for item in items]
+    values = [({"motion": "mocap", "file": item[0]} if item[0].lower().endswith(".amc") else {"motion": item[0]})
+              | {"seconds": float(item[1]) if len(item) == 2 else each} for item in items]
     return spec_from({"motion": values}, source).motion
-
-
-def _named(motion: str) -> dict[str, Any]:
-    """A gesture by name, or motion capture by file name."""
-    return {"motion": "mocap", "file": motion} if motion.lower().endswith(".amc") else {"motion": motion}
 
 
 def _motion(text: str | None, seconds: float | None, spec: Spec, source: str) -> list[dict[str, Any]]:

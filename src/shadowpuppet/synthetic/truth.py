@@ -12,7 +12,7 @@ from shadowpuppet.errors import RecordingError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import joint_columns
 from shadowpuppet.synthetic.movement.gait_cycle import Sole
-from shadowpuppet.synthetic.person.kinematics import SEGMENTS, Figure
+from shadowpuppet.synthetic.person.kinematics import SEGMENTS, PosedBody
 from shadowpuppet.synthetic.person.mannequin import JOINTS, Mannequin
 
 SOLES = ("left_heel", "left_toe", "right_heel", "right_toe")
@@ -33,7 +33,7 @@ class Soles(NamedTuple):
     """Whether each is in contact with the floor, of shape (T, 4), true or false."""
 
 
-def sole_points(body: Mannequin, figure: Figure) -> Array:
+def sole_points(body: Mannequin, figure: PosedBody) -> Array:
     """The points of `SOLES`, of shape (T, 4, 3), metres, world."""
     sole, found = Sole.of(body), []
     heel = np.array([0.0, sole.heel, -sole.ankle])
@@ -45,7 +45,7 @@ def sole_points(body: Mannequin, figure: Figure) -> Array:
     return np.stack(found, 1)
 
 
-def soles(body: Mannequin, figure: Figure, moving: Figure, seconds: Array) -> Soles:
+def soles(body: Mannequin, figure: PosedBody, moving: PosedBody, seconds: Array) -> Soles:
     """The soles of a figure in T frames; moving: the figure shortly before each of them, then shortly after (2 T), `seconds` (T,) apart."""
     points, (before, after) = sole_points(body, figure), np.split(sole_points(body, moving), 2)
     way = np.linalg.norm(after - before, axis=2)

@@ -14,7 +14,7 @@ from shadowpuppet.settings import STRICT
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
 Side = Annotated[int, Field(ge=16, le=4096)]
-Angle = Annotated[float, Field(ge=-180, le=180)]
+AngleDeg = Annotated[float, Field(ge=-180, le=180)]
 FovDeg = Annotated[float, Field(ge=10, le=170)]
 Height = Annotated[float, Field(ge=0.05, le=6)]
 Coefficient = Annotated[float, Field(allow_inf_nan=True)]  # infinite and NaN are refused by `Viewpoint`, whose message shows all numbers
@@ -45,7 +45,7 @@ class Viewpoint:
     """Height over the floor, metres."""
     distance: Distance = 2.0
     """Horizontal distance from the person's place, metres."""
-    azimuth_deg: Angle = 0.0
+    azimuth_deg: AngleDeg = 0.0
     """Direction from the person to the camera, degrees: 0 in front of the person, 90 on their left."""
     pitch_deg: Annotated[float, Field(ge=-60, le=60)] = 0.0
     """Angle below the horizontal, degrees."""
@@ -53,7 +53,7 @@ class Viewpoint:
     """OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]], or a fisheye's k1 k2 k3 k4; empty for no distortion."""
     yaw_deg: Annotated[float, Field(ge=-60, le=60)] = 0.0
     """Angle by which it looks past the person to its right, degrees."""
-    roll_deg: Angle = 0.0
+    roll_deg: AngleDeg = 0.0
     """Clockwise rotation about its optical axis, degrees."""
     fisheye: bool = False
     """Whether the lens is a fisheye (OpenCV's model, equidistant without distortion)."""
@@ -105,7 +105,7 @@ class Ring:
     """Distance of its middle to the person's left, metres."""
     height: Height = 1.6
     """Height over the floor, metres."""
-    start_deg: Angle = 0.0
+    start_deg: AngleDeg = 0.0
     """Direction from the middle to the first camera, degrees: 0 in front of the person, 90 on their left; the others follow to the left."""
     jitter: Annotated[float, Field(ge=0, le=1)] = 0.3
     """Irregularity of place, direction and focal length: 0 a perfect ring; 1 up to 7 degrees, 25 cm, 7 % of the radius."""

@@ -104,10 +104,10 @@ def _planks(colour: Array, x: Array, y: Array, rng: np.random.Generator) -> Arra
     return paint
 
 
-def fractal_noise(x: Array, y: Array, rng: np.random.Generator, octaves: int = 4) -> Array:
+def fractal_noise(x: Array, y: Array, rng: np.random.Generator) -> Array:
     """Fractal value noise over the plane, about -1 to 1."""
     total = np.zeros_like(x)
-    for octave in range(octaves):
+    for octave in range(4):
         lattice = rng.uniform(-1, 1, (64, 64))
         u, v = x * 1.3 * 2**octave + 31.7, y * 1.3 * 2**octave + 17.3
         i, j = np.floor(u).astype(int), np.floor(v).astype(int)

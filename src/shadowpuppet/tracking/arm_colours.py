@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.bits import Bits, count, pack, unpack
-from shadowpuppet.camera.colour_codes import LEVELS, NUMBER, Codes, step_of, thinned
+from shadowpuppet.camera.colour_codes import LEVELS, NUMBER, ColourCode, step_of, thinned
 from shadowpuppet.camera.mask import Mask, grown
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
@@ -63,7 +63,7 @@ class ArmColours:
 
     picture: Picture
 
-    def learnt(self, counts: ColourCounts | None, codes: Codes, mask: Mask, pose: Array) -> ColourCounts:
+    def learnt(self, counts: ColourCounts | None, codes: ColourCode, mask: Mask, pose: Array) -> ColourCounts:
         """The counts with those of one more frame, of its mask (H, W) and the pose (D,) found in it."""
         last = ColourCounts(*np.zeros((3, NUMBER), np.int64)) if counts is None else counts
         hand, forearm, upper, head, rest = (thinned(self.drawn(pose, kind)) for kind in KINDS)
@@ -72,7 +72,7 @@ class ArmColours:
         own = thinned(mask)
         return ColourCounts(*(each + np.bincount(codes[pixels & own], minlength=NUMBER) for each, pixels in zip(last, shown)))
 
-    def seen(self, counts: ColourCounts | None, codes: Codes, mask: Mask, pose: Array, ignore: Bits) -> PartObservation | None:
+    def seen(self, counts: ColourCounts | None, codes: ColourCode, mask: Mask, pose: Array, ignore: Bits) -> PartObservation | None:
         """The pixels of a mask (H, W) that have the arms' colours, and the parts that these are; None if the colours are not known, or do
         not differ from those of trunk and legs. Only what is before the trunk counts; not the head, nor where an upper body's legs may be,
         all as in the last frame's `pose` (D,); nor pixels in `ignore`."""
@@ -132,7 +132,7 @@ KINDS = ("hand", "forearm", "upper_arm", "head", "rest")
 """Kinds of parts whose colours may differ; `rest`: trunk and legs."""
 
 
-def coloured(of_arms: NDArray[np.bool_], codes: Codes, mask: Mask) -> Mask:
+def coloured(of_arms: NDArray[np.bool_], codes: ColourCode, mask: Mask) -> Mask:
     """The pixels of a mask (h, w) whose colours (h, w) are those of arms, (4096,), without single pixels."""
     return grown(grown(of_arms[codes] & mask, -1), 1)
 

@@ -13,12 +13,12 @@ from shadowpuppet.errors import VideoError
 from shadowpuppet.video.camera_device import camera_number, open_camera
 from shadowpuppet.video.container import FILM_SUFFIXES
 from shadowpuppet.video.film import open_film
-from shadowpuppet.video.frames import Frame, FrameSource, Image, Size, Wanted
+from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Image, Size, Wanted
 from shadowpuppet.video.images import IMAGE_SUFFIXES, open_folder, open_picture, read_image, write_image
 from shadowpuppet.video.writer import FrameWriter, write_frames
 
 __all__ = ["FILM_SUFFIXES", "IMAGE_SUFFIXES", "Frame", "FrameSource", "FrameWriter", "Image", "Size", "camera_number", "fitted",
-           "open_frames", "read_image", "write_frames", "write_image"]
+           "open_frames", "open_untimed", "read_image", "write_frames", "write_image"]
 
 
 def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | None = None, rate: float | None = None,
@@ -51,6 +51,11 @@ def open_frames(source: str | Path | int, *, grey: bool = False, size: Size | No
     else:
         frames = open_film(path, grey, rate)
     return fitted(frames, size, whole)
+
+
+def open_untimed(source: str | Path) -> FrameSource:
+    """As `open_frames`, for pictures without regard to their times: a folder needs none."""
+    return open_frames(source, rate=ASSUMED_RATE if Path(source).is_dir() else None)
 
 
 def fitted(frames: FrameSource, size: Size | None, whole: Size | None = None) -> FrameSource:

@@ -11,23 +11,23 @@ from typing import Generic, Self, TypeVar
 from shadowpuppet.errors import VideoError
 from shadowpuppet.video.live_source import Feed, Snapshot
 
-Item = TypeVar("Item")
+Held = TypeVar("Held")
 FIRST_WAIT, LONGEST_WAIT = 0.5, 8.0
 """Seconds before a camera that broke off is opened again; the wait doubles each time."""
 NAP = 0.1
 """Seconds after which a film that stands still looks whether it is to end."""
 
 
-class Newest(Generic[Item]):
+class Newest(Generic[Held]):
     """A buffer for one item, shared by threads: a new item replaces one that was not taken."""
 
     def __init__(self) -> None:
         """Empty."""
         self.put_count, self.dropped = 0, 0
-        self._item: Item | None = None
+        self._item: Held | None = None
         self._changed = threading.Condition()
 
-    def put(self, item: Item) -> None:
+    def put(self, item: Held) -> None:
         """Store an item; one that was not taken is dropped, and counted."""
         with self._changed:
             self.put_count += 1
@@ -35,7 +35,7 @@ class Newest(Generic[Item]):
             self._item = item
             self._changed.notify_all()
 
-    def take(self, timeout: float = 0.0) -> Item | None:
+    def take(self, timeout: float = 0.0) -> Held | None:
         """Remove and return the item, waiting up to `timeout` seconds; None if none comes."""
         with self._changed:
             if self._item is None and timeout > 0:
@@ -54,7 +54,7 @@ class Newest(Generic[Item]):
             self._changed.notify_all()
 
 
-class Capture:
+class CameraCapture:
     """Reads a feed within its `with` block; `newest.take()` is the latest picture."""
 
     def __init__(self, feed: Feed, newest: Newest[Snapshot] | None = None) -> None:

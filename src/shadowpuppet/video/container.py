@@ -26,7 +26,7 @@ CONTAINERS = ("mov", "matroska", "avi", "mpegts", "mpeg", "mpegvideo", "ogg", "f
 lists, scripts, descriptions of sessions), or are no film."""
 LISTS = {b"#EXTM3U": "a play list (HLS)", b"ffconcat": "a list of films (ffconcat)", b"v=0": "the description of a session (SDP)",
          b"<?xml": "an XML file", b"<MPD": "a play list (DASH)"}
-"""What a file is that begins with some bytes, for messages."""
+"""Kind of a file by its first bytes, for messages."""
 DOORS = {"protocol_whitelist": "file", "format_whitelist": ",".join(CONTAINERS), "enable_drefs": "0", "use_absolute_path": "0"}
 """Options of FFmpeg, which compares the kind of a file with the list before anything else is opened: .mov files that refer to data in other
 files do not open them."""
@@ -38,8 +38,8 @@ FRAME_BYTES = 3
 
 @contextlib.contextmanager
 def opened(path: Path, threads: int | None = None) -> Iterator[tuple[InputContainer, VideoStream]]:
-    """Open a film; gives its container and video stream. `threads` that decode: each of several has a frame of its own before the first
-    comes, so that one is quicker for a few frames. Raises `VideoError`."""
+    """Open a film; gives its container and video stream. `threads`: number of threads that decode; one is quicker for a few frames, as each
+    of several decodes a frame before the first comes. Raises `VideoError`."""
     import av
     import av.error
 
@@ -88,7 +88,7 @@ def _stated_size(path: Path) -> tuple[int, int]:
 
 
 def _threads(pixels: int) -> int:
-    """Number of threads that decode frames of so many pixels, each of which holds one; 0: FFmpeg's default."""
+    """Number of threads that decode frames of `pixels`; each thread holds one frame. 0: FFmpeg's default."""
     most, limit = FILE_MEMORY // (FRAME_BYTES * max(pixels, 1)), thread_limit() or 0
     return limit if most >= (limit or os.cpu_count() or 1) else max(most, 1)
 

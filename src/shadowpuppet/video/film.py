@@ -30,6 +30,8 @@ FULL_RANGE = 2
 """FFmpeg's AVCOL_RANGE_JPEG: luma over 0..255."""
 EVEN = 0.25
 """Greatest difference of a steady film's times from even ones, over their interval: a missing frame makes half."""
+NOT_LATER = "one that is not later"
+"""In a message about such frames, of which a terminal shows one for all films of a recording."""
 LONGEST_STUTTER = 1.0
 """Seconds; times that go back by more are taken for a restart of the clock."""
 STUDIO_TO_FULL = np.clip(np.round((np.arange(256) - 16) * (255 / 219)), 0, 255).astype(np.uint8)
@@ -104,7 +106,7 @@ def _frames(path: Path, film: FrameSource, step: float, grey: bool, rate: float 
                 given += 1
                 yield frame
             return
-    again = iter(answers)  # each frame is asked for once
+    again = iter(answers)  # each frame is requested once
     yield from islice(_shown(path, film, step, grey, rate, lambda time: wanted(time) if (known := next(again, None)) is None else known,
                              _one_by_one), given, None)
 
@@ -118,7 +120,7 @@ def _shown(path: Path, film: FrameSource, step: float, grey: bool, rate: float |
     clock, convert, n, longest, broken = _Clock(path, step, quiet=rate is not None), converter(grey), 0, 0.0, ""
 
     def time_shown() -> float:
-        """Time (s) of the frame asked for last."""
+        """Time (s) of the last requested frame."""
         return (n - 1) / rate if rate else clock.last
 
     def asked(frame: Stamped) -> bool:
@@ -239,7 +241,7 @@ class _Clock:
         if time > self.last:
             return time
         self.bad_pts += 1
-        self._warn(self.last, "is followed by one that is not later; times are moved so that they increase")
+        self._warn(self.last, f"is followed by {NOT_LATER}; times are moved so that they increase")
         if self.last - time < LONGEST_STUTTER:  # later times are correct again
             return self.last + self.step / 2
         self.shift += self.last + self.step - time  # the clock restarted

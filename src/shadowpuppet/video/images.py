@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import math
 import os
@@ -182,7 +183,10 @@ def _natural(path: Path) -> list[tuple[int, str]]:
 def _read_times(path: Path, count: int) -> NDArray[np.float64]:
     """Read times (count,), seconds after the first: one number per line, or the first column of a table, with or without a header."""
     try:
-        lines = [line.strip() for line in path.read_text("utf-8-sig").splitlines() if line.strip()]
+        content = path.read_bytes()
+        is_wide = content[2:] and content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        text = content.decode("utf-16" if is_wide else "utf-8-sig")
+        lines = [line.strip() for line in text.splitlines() if line.strip()]
         cells = [re.split(r"[,;\s]", line)[0] for line in lines]
         times = np.array(cells[1:] if cells and not re.match(r"[-+.\d]", cells[0]) else cells, float)
     except (OSError, ValueError) as error:

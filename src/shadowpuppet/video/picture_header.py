@@ -24,7 +24,7 @@ SCAN, END = 0xDA, 0xD9
 
 
 class Header(NamedTuple):
-    """What a picture's header says."""
+    """Facts in a picture's header."""
 
     width: int
     height: int

@@ -89,7 +89,7 @@ class _Reader:
             last = pts
 
     def frame(self, pts: int) -> VideoFrame:
-        """The frame of a time that is not before that of the last one."""
+        """The frame of a time that is not before the last request's."""
         while not self.frames:
             if not self.held and not self.ended:
                 self._read()

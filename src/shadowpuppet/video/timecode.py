@@ -18,8 +18,8 @@ def read_timecode(path: Path) -> float | None:
     with opened(path) as (container, pictures):
         rate = pictures.average_rate
         notes = {key.lower(): text for each in (*container.streams, container) for key, text in each.metadata.items()}
-    told = notes.get("timecode")
-    return None if told is None or not rate else seconds_of(told, float(rate))
+    stated = notes.get("timecode")
+    return None if stated is None or not rate else seconds_of(stated, float(rate))
 
 
 def seconds_of(timecode: str, rate: float) -> float | None:

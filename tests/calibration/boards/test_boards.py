@@ -48,6 +48,30 @@ def test_corners_keep_their_numbers_when_the_board_is_turned(board):
     np.testing.assert_allclose(turned.pixels, np.array(image.shape[::-1]) - 1 - straight.pixels, atol=0.6)
 
 
+@pytest.mark.parametrize("board", BOARDS, ids=NAMES)
+def test_a_board_printed_inverted_is_found_and_said(board):
+    image = picture(board)
+    straight, inverted = BoardDetector(board).find(image), BoardDetector(board).find(~image)
+    assert straight is not None
+    assert not straight.inverted
+    assert inverted is not None
+    pixels = inverted.pixels
+    if board.kind == "checkerboard":  # inverted, it is the same board after half a turn
+        pixels = pixels[::-1]
+    else:
+        assert inverted.inverted
+    np.testing.assert_array_equal(inverted.ids, straight.ids)
+    np.testing.assert_allclose(pixels, straight.pixels, atol=0.1)
+
+
+def test_a_board_once_found_is_looked_for_as_it_is_printed():
+    detector, image = BoardDetector(BOARDS[0]), picture(BOARDS[0])
+    assert detector.find(np.full((100, 100), 128, np.uint8)) is None
+    assert detector.find(~image) is not None
+    assert detector.find(image) is None
+    assert detector.find(~image) is not None
+
+
 def test_a_mirrored_board_and_an_empty_picture_show_nothing():
     image = picture(BOARDS[0])
     assert BoardDetector(BOARDS[0]).find(np.ascontiguousarray(image[:, ::-1])) is None

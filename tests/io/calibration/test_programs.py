@@ -130,6 +130,13 @@ def test_a_camera_of_qualisys_that_filmed_is_one_for_films(tmp_path, made, calib
     assert not found.notes
 
 
+def test_a_camera_of_vicon_that_filmed_is_one_for_films(tmp_path, made):
+    (tmp_path / "a.xcp").write_text(calibrations.vicon(made))
+    (tmp_path / "999.avi").write_bytes(b"")
+    found = examine_calibration(tmp_path / "a.xcp")
+    assert [camera.name for camera in found.cameras] == [*(camera.name for camera in made), "999"]
+
+
 def test_hybrid_cameras_of_qualisys_make_films(tmp_path, made):
     text = calibrations.qualisys(made).replace("Oqus 400", "Miqus Hybrid")
     (tmp_path / "Calib.qca.txt").write_text(text)

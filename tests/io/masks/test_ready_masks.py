@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
-
 import cv2
 import numpy as np
 import pytest
+from png import palette_png
 
 from shadowpuppet.errors import SilhouetteError, VideoError
 from shadowpuppet.io.masks.ready_masks import mask_kind, open_masks
@@ -24,16 +22,6 @@ def person(n: int, top: int = 8) -> np.ndarray:
     if n > 2:
         out[top : top + 20, 10 + n : 20 + n] = True
     return out
-
-
-def palette_png(places: np.ndarray, palette: tuple[int, ...], opacity: tuple[int, ...] = ()) -> bytes:
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    rows = b"".join(b"\0" + row.tobytes() for row in places.astype(np.uint8))
-    head = struct.pack(">IIBBBBB", *places.shape[::-1], 8, 3, 0, 0, 0)
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"PLTE", bytes(palette))
-            + (chunk(b"tRNS", bytes(opacity)) if opacity else b"") + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 
 
 def png(image: np.ndarray) -> bytes:
@@ -87,6 +75,22 @@ def test_of_several_labels_one_is_chosen(tmp_path, form):
         mask_kind(tmp_path)
     for n, frame in enumerate(open_masks(tmp_path, mask_kind(tmp_path, 2))):
         np.testing.assert_array_equal(frame.image > 0, person(n))
+
+
+def test_a_label_that_no_mask_has_is_named(tmp_path):
+    for n in range(NUMBER):
+        (tmp_path / f"{n:02d}.png").write_bytes(png(3 * person(n).astype(np.uint8) + 2 * (n == 7) * np.roll(person(n), -9, 1)))
+    assert mask_kind(tmp_path, 3).person == 3
+    with pytest.raises(SilhouetteError, match="label: found 9, which is in no mask, expected "):
+        mask_kind(tmp_path, 9)
+    with pytest.raises(SilhouetteError, match="label: found 0, which is the background, expected "):
+        mask_kind(tmp_path, 0)
+
+
+def test_a_label_that_few_masks_have_is_found(tmp_path):
+    for n in range(60):
+        (tmp_path / f"{n:02d}.png").write_bytes(png((1 + 3 * (n == 31)) * person(9).astype(np.uint8)))
+    assert mask_kind(tmp_path, 4).person == 4
 
 
 @pytest.mark.parametrize("inverted", [False, True])

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shadowpuppet.motion.contact.contact import FootEvent, contacts_of, find_contacts, foot_events
-from shadowpuppet.motion.contact.floor import floor_height, under_feet
-from shadowpuppet.motion.contact.stance import agreement, depth, slide
+from shadowpuppet.evaluation.standing import agreement, depth, slide
+from shadowpuppet.motion.contact.contact import FootEvent, contacts_of, find_contacts, floor_height, foot_events, under_feet
 from shadowpuppet.motion.motion import JointTable
 
 RATE, FLOOR = 60.0, 0.12

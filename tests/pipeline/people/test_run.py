@@ -23,12 +23,12 @@ from shadowpuppet.io.files.lock import LOCK
 from shadowpuppet.io.people import person_folders, read_places
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import CompleteRun
-from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline import frame_process, progress
 from shadowpuppet.pipeline.options import make_options
-from shadowpuppet.pipeline.people.census import people_in, sampled_sets, take_census
+from shadowpuppet.pipeline.people import run as module
+from shadowpuppet.pipeline.people.census import are_apart, people_in, sampled_sets, take_census
 from shadowpuppet.pipeline.people.group import first_people
-from shadowpuppet.pipeline.people.run import PeopleRun, check_people
+from shadowpuppet.pipeline.people.run import check_people
 from shadowpuppet.pipeline.people.truths import matched_truths
 from shadowpuppet.pipeline.prepare import MULTIVIEW
 from shadowpuppet.pipeline.progress import Listener
@@ -215,6 +215,45 @@ def test_what_a_run_cannot_go_on_from(run, tracked, tmp_path):
         tracked(run.folder, resume=True)
 
 
+@pytest.fixture
+def lines(shell, tracked, tmp_path):
+    """Tracks the recording of two people as a user types it, into the folder `run`."""
+    def call(*flags: object):
+        return shell("track", tracked.recording, "--masks", "--multiview.particles", "4", "-o", tmp_path / "run", *flags)
+
+    return call
+
+
+@pytest.mark.whole
+def test_one_of_two_people_is_followed_if_that_is_asked_for(lines, run, tmp_path):
+    said = lines("--people", "1", "--person", run.folder / "person-1" / "person.toml")
+    assert said.code == 0, said.err
+    assert "2 people: one is tracked, others are ignored" in said.out + said.err
+    assert (tmp_path / "run" / "joints.csv").exists()
+    assert person_folders(tmp_path / "run") == {}
+    assert not (tmp_path / "run" / "person-1").exists()
+    found = read_run(tmp_path / "run")
+    assert found.info["settings"]["people"] == 1
+    assert len(found.motion) == FRAMES
+
+
+@pytest.mark.whole
+def test_the_run_of_the_only_one_who_could_be_followed_lies_in_its_own_folder(tracked, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "first_people", lambda *given: first_people(*given)[:1])
+    with pytest.warns(ShadowPuppetWarning, match="2 people were counted, 1 could be followed"):
+        found = tracked(tmp_path / "run", overlay=False)
+    assert "people" not in found.metrics
+    assert found.metrics["frames_per_s"] > 0
+    one = read_run(tmp_path / "run")
+    assert one.complete
+    assert len(one.motion) == len(found.motion) > 0
+    assert {"person", "people"}.isdisjoint(one.info)
+    assert one.metrics["verdict"] == found.metrics["verdict"]
+    assert not list((tmp_path / "run").glob("person-*"))
+    assert not (tmp_path / "run" / "people.csv").exists()
+    assert not list((tmp_path / "run").glob("checkpoint*"))
+
+
 def test_places_are_those_of_the_people(run):
     ends = sorted((where[-1].round(2).tolist() for _, _, where in read_places(run.folder).values()), key=lambda place: place[0])
     assert np.allclose(ends, [(-0.6, 0.3), (0.9, -0.4)], atol=0.15)
@@ -262,7 +301,7 @@ def test_a_picture_that_is_all_silhouette_shows_nobody():
     census = take_census(made, sets_of([full] * 3))
     assert census is not None
     assert census.numbers == (1, 1, 1)
-    assert [len(figures) for figures in first_people(census.floor, [0.0, 0.1, 0.2], sets_of([full] * 3))[1]] == [1, 1, 1]
+    assert [len(each.sightings) for each in first_people(census.floor, [0.0, 0.1, 0.2], sets_of([full] * 3))] == [3]
 
 
 def test_who_comes_later_is_counted(seen):
@@ -282,6 +321,15 @@ def test_who_is_there_for_a_twelfth_of_the_film_is_counted(seen):
     assert census.number == 2
 
 
+def test_people_are_apart_where_two_cameras_show_several(seen):
+    masks = seen[1]
+    alone = [[mask & (np.arange(mask.shape[1]) < 0) for mask in every] for every in masks]
+    assert are_apart(sets_of(masks))
+    one_camera = [[every[0], *(seen_by(camera, people(n)[0]) for camera in seen[0][1:])] for n, every in enumerate(masks)]
+    assert not are_apart(sets_of(one_camera))
+    assert not are_apart(sets_of(alone))
+
+
 def test_parts_of_a_picture_that_may_be_people():
     mask = np.zeros((40, 60), bool)
     assert people_in(mask) == 0
@@ -295,14 +343,9 @@ def test_parts_of_a_picture_that_may_be_people():
 def test_what_several_people_cannot_have():
     with pytest.raises(SettingsError, match=r"person: found .*one\.toml for several people"):
         check_people(make_options({"person": "one.toml"}))
+    check_people(make_options({"person": "one.toml", "people": 1}))
 
 
 def test_no_truth_is_nobodys(run):
     motions = {number: read_run(folder).motion for number, folder in person_folders(run.folder).items()}
     assert matched_truths(motions, []) == {}
-
-
-def test_nothing_of_a_person_who_may_face_the_other_way_is_vouched_for():
-    frame = PeopleRun._doubted(MotionFrame(0.0, "tracked", limb_status=["tracked", "predicted", "lost"]))
-    assert (frame.status, frame.limb_status) == ("uncertain", ["uncertain", "predicted", "lost"])
-    assert PeopleRun._doubted(MotionFrame(0.0, "lost")).status == "lost"

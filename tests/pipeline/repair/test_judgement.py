@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from shadowpuppet.calibration.agreement import MAX_DISAGREEMENT
-from shadowpuppet.calibration.time_offset import TimeOffsets
+from shadowpuppet.calibration.time_offset import TimeOffsets, certain_offsets
+from shadowpuppet.pipeline.repair import check as judging
 from shadowpuppet.pipeline.repair.check import (
     SETS_COMPARED,
     RotationFix,
-    _certain,
     _directions,
     _in_frames,
     _standing_out,
@@ -47,10 +47,9 @@ def test_of_too_few_sets_what_is_missing_is_nothing():
 
 
 def test_an_offset_is_certain_beyond_its_limits():
-    found = SimpleNamespace(wrong=("b",))
-    assert _certain(offsets((0.51, 0.51, -0.51, 0.5)), found) == [0.51, 0.0, -0.51, 0.0]
-    assert _certain(offsets((1.6, 1.6, None, -1.4), (1.0, 1.0, None, 1.0)), found) == [1.6, 1.6, 0.0, 0.0]
-    assert _certain(offsets((0.6, 1.5, 0.6, 0.6), (None, 0.0, 0.39, 0.41)), found) == [0.6, 0.0, 0.6, 0.0]
+    assert certain_offsets(offsets((0.51, 0.51, -0.51, 0.5)), ("b",)) == [0.51, 0.0, -0.51, 0.0]
+    assert certain_offsets(offsets((1.6, 1.6, None, -1.4), (1.0, 1.0, None, 1.0)), ("b",)) == [1.6, 1.6, 0.0, 0.0]
+    assert certain_offsets(offsets((0.6, 1.5, 0.6, 0.6), (None, 0.0, 0.39, 0.41)), ("b",)) == [0.6, 0.0, 0.6, 0.0]
 
 
 def test_offsets_of_sets_are_those_of_frames():
@@ -123,3 +122,19 @@ def test_doubts():
     assert doubts_of(check(agreement=agreement((1.0, 9.0, 1.5, 1.0)))) == [
         "camera 'b' disagrees with the others by 9.0 pixels, they by 1.5 at most; calibrate it again, or leave it out: --camera a,c,d"]
     assert doubts_of(check(agreement=agreement((1.0, 9.0, 1.5, 1.0), doubts=lambda: ["a word"]))) == ["a word"]
+
+
+@pytest.mark.parametrize(("before", "after", "stated"), [
+    ((466.0, 470, 480, 466), (464.0, 468, 478, 464), False),  # most cameras fit no better: noise
+    ((9.0, 9, 20, 9), (1.0, 1, 1.2, 1), True), ((0.3, 0.2, 0.4, 0.2), (0.3, 0.25, 0.4, 0.2), True),  # a slow person hides a delay
+    ((0.3, 0.2, 0.4, 0.2), (0.9, 0.9, 0.9, 0.9), False), ((9.0, 9, 60, 9), (1.0, 1, 60, 1), True),  # one camera is misplaced besides
+])
+def test_a_delay_is_stated_only_where_the_films_fit_with_it(monkeypatch, before, after, stated):
+    results = iter([agreement(before), agreement(after)])
+    monkeypatch.setattr(judging, "compare_cameras", lambda *_, **__: next(results))
+    monkeypatch.setattr(judging, "time_offsets", lambda *_: offsets((0.0, 0.0, 5.0, 0.0)))
+    monkeypatch.setattr(judging, "_rotations", lambda *_: {})
+    monkeypatch.setattr(judging, "_pushed", lambda *_: {})
+    rows = [[None] * 4] * 40
+    rig = SimpleNamespace(cameras=[SimpleNamespace(name=name) for name in NAMES])
+    assert judging._judged(rig, rows).shifts == ([0.0, 0.0, 5.0, 0.0] if stated else [0.0] * 4)

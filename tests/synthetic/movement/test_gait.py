@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec, demo_spec, proving_ground, spec_from
 from shadowpuppet.synthetic.movement.actions import ACTIONS
-from shadowpuppet.synthetic.movement.gait import Walk
+from shadowpuppet.synthetic.movement.gait import PathWalk
 from shadowpuppet.synthetic.movement.gait_curves import KNEE_ZERO, RUN, STANDING_TILT, WALK, curve
 from shadowpuppet.synthetic.movement.gait_cycle import JOGGING, WALKING, GaitCycle, Sole, stride_length
 from shadowpuppet.synthetic.movement.gestures import LEVEL, posture
@@ -61,7 +61,7 @@ def bend(figure, a, b, c):
 
 def steady(jogging=False, speed=None, seconds=24.0, body=MAN, path="line", size=300.0, seed=5):
     """A gait far from its start and end: (walk, figure, phase of the left leg)."""
-    walk = Walk(body, seconds, np.random.default_rng(seed), jogging, speed, path, size)
+    walk = PathWalk(body, seconds, np.random.default_rng(seed), jogging, speed, path, size)
     t = np.arange(3.0, seconds - 3.0, 1 / 100)
     return walk, pose_over(body, *walk.at(t), SOFT_LIMIT), np.interp(t, walk.ticks, walk.phase)
 
@@ -509,7 +509,7 @@ def test_a_fist_is_a_fist_and_an_open_hand_stays_as_it_was():
 
 
 def test_walks_are_made_of_all_channels():
-    postures, stance = Walk(MAN, 5.0, np.random.default_rng(1)).at(np.arange(0, 5, 0.1))
+    postures, stance = PathWalk(MAN, 5.0, np.random.default_rng(1)).at(np.arange(0, 5, 0.1))
     assert postures.shape == (50, len(CHANNELS))
     assert [np.shape(part) for part in stance] == [(50, 3), (50, 2, 3), (50, 2, 3, 3), (50, 2), (50, 2, 3)]
 
@@ -520,8 +520,8 @@ def test_the_mean_man_and_woman_have_the_mass_index_of_the_survey(rng):
 
     from shadowpuppet.synthetic import Viewpoint
     from shadowpuppet.synthetic.person.clothes import Clothes
-    from shadowpuppet.synthetic.person.dressed import dressed
     from shadowpuppet.synthetic.person_renderer import PersonRenderer
+    from shadowpuppet.synthetic.scene_renderer import dressed
 
     bare = Clothes(looseness=0.0)
     for stature, build, wanted in ((1.629, 0.0, 25.6), (1.756, 1.0, 27.8)):

@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 from shadowpuppet.synthetic import Gesture, Mannequin, Spec
 from shadowpuppet.synthetic.movement.resting import LYING_GESTURES, seat_height
 from shadowpuppet.synthetic.person.clothes import Clothes
-from shadowpuppet.synthetic.person.dressed import dressed
-from shadowpuppet.synthetic.person.kinematics import SEGMENTS, Figure
+from shadowpuppet.synthetic.person.kinematics import SEGMENTS, PosedBody
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import feet_of, perform
+from shadowpuppet.synthetic.scene_renderer import dressed
 
 bodies = st.builds(lambda seed, kind: Mannequin.draw(np.random.default_rng(seed), kind), st.integers(0, 500),
                    st.sampled_from(["woman", "man", "child"]))  # fmt: skip
 
 
-def lowest(body: Mannequin, figure: Figure) -> dict[str, float]:
+def lowest(body: Mannequin, figure: PosedBody) -> dict[str, float]:
     """The lowest height of each segment's surface over all times, metres."""
     s, around = dressed(body, Clothes.draw(np.random.default_rng(3))), np.linspace(0, 2 * np.pi, 16)
     found = dict.fromkeys(SEGMENTS, 9.0)
@@ -33,7 +33,7 @@ def lowest(body: Mannequin, figure: Figure) -> dict[str, float]:
     return found
 
 
-def resting(body: Mannequin, posture, motion: str = "stand", turn: float = 0.0) -> Figure:
+def resting(body: Mannequin, posture, motion: str = "stand", turn: float = 0.0) -> PosedBody:
     return perform(Spec(body=body, posture=posture, motion=(Gesture(motion=motion, seconds=3),), rate=5, turn_deg=turn),
                    np.random.default_rng(1))[1]
 

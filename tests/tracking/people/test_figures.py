@@ -26,7 +26,7 @@ from shadowpuppet.tracking.people.floor import (
     floor_under,
     pixel_index,
 )
-from shadowpuppet.tracking.people.presence import Followed, certain_number, counted, follow, sure_number
+from shadowpuppet.tracking.people.presence import Followed, certain_number, counted, follow, sightings, sure_number
 
 ROUND = np.array([[-2.0, -2, 0], [2, 2, 1.8], [0, 0, 0], [-1, 1, 1], [1, -1, 1]])
 
@@ -256,10 +256,11 @@ def figure(x: float, y: float = 0.0) -> Figure:
 def test_figures_are_followed_by_nearness():
     people: list[Followed] = []
     for n in range(5):
-        people = follow(people, n, 0.2 * n, [figure(1 - 0.3 * n, 1.0), figure(-1 + 0.3 * n)])
-    assert [len(each.sets) for each in people] == [5, 5]
-    assert people[0].place[1] == 1.0
-    people = follow(people, 5, 1.0, [figure(9.0)])
+        people = follow(people, sightings(0.2 * n, [figure(1 - 0.3 * n, 1.0), figure(-1 + 0.3 * n)], ()))
+    assert [len(each.sightings) for each in people] == [5, 5]
+    assert people[0].last.figure.place[1] == 1.0
+    assert people[0].last.others == (people[1].last.figure,)
+    people = follow(people, sightings(1.0, [figure(9.0)], ()))
     assert len(people) == 3
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import actor
 import numpy as np
 import pytest
@@ -12,8 +10,8 @@ from shadowpuppet.camera.bits import count, pack
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.people import tracker as module
-from shadowpuppet.tracking.people.evidence import Drawn, draw_person
-from shadowpuppet.tracking.people.tracker import Person, Share, at_pose, keep_front, step, tells_front, turn_round
+from shadowpuppet.tracking.people.evidence import draw_person
+from shadowpuppet.tracking.people.tracker import Person, at_pose, step, tells_front, turn_round
 
 POSE = actor.stance(actor.body().skeleton, 0.3, 0.2)
 HEADING = 3
@@ -59,19 +57,6 @@ def test_the_other_way_is_searched_for(rng):
     assert np.cos(found.pose[HEADING] - POSE[HEADING]) > 0.9
     assert actor.apart(actor.body(), found.pose, POSE)[0] < 0.04
     assert found.overlap > 0.85
-
-
-@pytest.mark.parametrize(("turn", "overlap", "turned", "kept"), [
-    (np.pi, 0.8, 0.79, True), (np.pi, 0.8, 0.77, False), (0.5, 0.8, 0.9, False), (np.pi, 0.8, np.nan, False)])
-def test_the_front_is_kept_unless_the_other_fits_clearly_better(monkeypatch, turn, overlap, turned, kept):
-    tracker, now = person(), POSE.copy()
-    now[HEADING] += turn
-    other = at(tracker, POSE, turned)._replace(status="lost" if np.isnan(turned) else "tracked")
-    monkeypatch.setattr(module, "turn_round", lambda *given: other)
-    share = Share(at(tracker, now, overlap), SimpleNamespace(), [], Drawn((), (), np.zeros((0, 3)), np.zeros(0)))
-    found = keep_front(tracker, np.random.default_rng(0), at(tracker, POSE), share)
-    assert (found.state is other) == kept
-    assert (found is share) != kept
 
 
 def test_a_body_that_comes_round_again_does_not_face_the_other_way(monkeypatch, rng):

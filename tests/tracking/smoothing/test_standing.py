@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.motion.contact.stance import slide
+from shadowpuppet.evaluation.standing import slide
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.tracking.smoothing.fixed_interval import differences
 from shadowpuppet.tracking.smoothing.pose_path import PathCost

@@ -15,9 +15,8 @@ MIN_CORNERS = 8
 """Least number of corners of a view."""
 MIN_SPREAD = 0.02
 """Least ratio of a view's extent across its longest direction to that along it: corners in a line give no pose."""
-MAX_HOMOGRAPHY_ERROR = 0.25
-"""Corners are dropped that lie farther from the plane's homography than this share of a square: markers read wrongly."""
-
+QUICK_SIDE = 960
+"""Longer side, pixels, of the picture in which a checkerboard is looked for."""
 MANY_MARKERS, ENLARGED = 0.8, 2
 """Share of a board's markers under which they are looked for in the enlarged picture as well, and by how much it is enlarged."""
 
@@ -33,24 +32,36 @@ class View(NamedTuple):
     """The corners, of shape (K, 2)."""
     sharpness: float
     """Steepness of its edges: share of the board's contrast that the steepest pixels change by, from one pixel to the next."""
+    inverted: bool = False
+    """Whether the board is printed inverted, white where black is expected."""
 
 
 class BoardDetector:
-    """Finds a board in grey pictures; one for each thread."""
+    """Finds a board in the grey pictures of one film; one for each thread."""
 
     def __init__(self, board: Board) -> None:
         """Of a board."""
         import cv2
 
         self.board, self._print = board, print_of(board)
+        self._prints = (False, True) if board.kind == "charuco" else (False,)  # an inverted checkerboard is one after half a turn
         self._markers = cv2.aruco.ArucoDetector(board.aruco_dictionary) if board.kind == "charuco" else None
 
     def find(self, grey: NDArray[np.uint8], time: float = 0.0) -> View | None:
-        """The view of the board in a picture (H, W); None if it shows fewer than `MIN_CORNERS`."""
+        """The view of the board in a picture (H, W); None if it shows fewer than `MIN_CORNERS`. Until a ChArUco board is found for the
+        first time, negatives are tried, too: it may be printed inverted."""
+        for inverted in self._prints:
+            view = self._found(~grey if inverted else grey, time)
+            if view is not None:
+                self._prints = (inverted,)
+                return view._replace(inverted=inverted)
+        return None
+
+    def _found(self, grey: NDArray[np.uint8], time: float) -> View | None:
         found = self._charuco_corners(grey) if self._markers is not None else self._checker_corners(grey)
         if found is None:
             return None
-        ids, pixels = _consistent(self.board, *found)
+        ids, pixels = found
         if len(ids) < MIN_CORNERS or not _spans_a_plane(self.board.points[ids]):
             return None
         return View(time, ids, pixels, _sharpness(grey, pixels))
@@ -77,22 +88,14 @@ class BoardDetector:
     def _checker_corners(self, grey: NDArray[np.uint8]) -> tuple[NDArray[np.int64], Array] | None:
         import cv2
 
-        across, down = self.board.inner
-        scale = max(1.0, max(grey.shape) / 960)  # a quick look in a small picture, as most show no whole board
+        scale = max(1.0, max(grey.shape) / QUICK_SIDE)  # a quick look in a small picture, as most show no whole board
         small = cv2.resize(grey, None, fx=1 / scale, fy=1 / scale, interpolation=cv2.INTER_AREA) if scale > 1 else grey
-        flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_FAST_CHECK | cv2.CALIB_CB_NORMALIZE_IMAGE
-        good, rough = cv2.findChessboardCorners(small, (across, down), flags=flags)
-        if not good or rough is None:
+        good, rough = cv2.findChessboardCornersSB(small, self.board.inner, flags=cv2.CALIB_CB_NORMALIZE_IMAGE)
+        if not good:
             return None
-        start = (np.asarray(rough, np.float32).reshape(-1, 1, 2) + 0.5) * np.float32(scale) - np.float32(0.5)
-        grid = start.reshape(down, across, 2)
-        gap = min(float(np.linalg.norm(np.diff(grid, axis=axis), axis=-1).min()) for axis in (0, 1))
-        half = int(np.clip(gap / 3, 2, 11))
-        stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 40, 1e-3)
-        pixels = np.asarray(cv2.cornerSubPix(grey, np.ascontiguousarray(start), (half, half), (-1, -1), stop), float).reshape(-1, 2)
-        ids, pixels = np.arange(across * down), _in_order(self.board, grey, pixels)
+        pixels = _in_order(self.board, grey, (np.asarray(rough, float).reshape(-1, 2) + 0.5) * scale - 0.5)
         better = registered(self._print, grey, self.board.points[:, :2], pixels)
-        return better if len(better[0]) >= MIN_CORNERS else (ids, pixels)
+        return better if len(better[0]) >= MIN_CORNERS else (np.arange(len(pixels)), pixels)
 
 
 def _in_order(board: Board, grey: NDArray[np.uint8], pixels: Array) -> Array:
@@ -113,23 +116,6 @@ def _in_order(board: Board, grey: NDArray[np.uint8], pixels: Array) -> Array:
 def _grey_at(grey: NDArray[np.uint8], pixel: Array) -> float:
     x, y = np.clip(np.rint(pixel).astype(int), 0, np.array(grey.shape[::-1]) - 1)
     return float(grey[max(0, y - 1) : y + 2, max(0, x - 1) : x + 2].mean())
-
-
-def _consistent(board: Board, ids: NDArray[np.int64], pixels: Array) -> tuple[NDArray[np.int64], Array]:
-    """The corners without those that are far from where their neighbours would have them: the median of local affine predictions."""
-    place = board.points[ids, :2] / board.square
-    if len(ids) < MIN_CORNERS:
-        return ids, pixels
-    off = np.zeros(len(ids))
-    for k in range(len(ids)):
-        near = np.argsort(((place - place[k]) ** 2).sum(1), kind="stable")[1:8]
-        A = np.concatenate([place[near] - place[k], np.ones((len(near), 1))], axis=1)
-        if np.linalg.matrix_rank(A, tol=1e-6) < 3:
-            continue
-        fit = np.linalg.lstsq(A, pixels[near], rcond=None)[0]
-        off[k] = np.linalg.norm(fit[2] - pixels[k]) / max(float(np.linalg.norm(fit[:2], axis=1).max()), 1e-9)
-    keep = off <= MAX_HOMOGRAPHY_ERROR
-    return (ids[keep], pixels[keep]) if keep.sum() >= MIN_CORNERS else (ids[:0], pixels[:0])
 
 
 def _spans_a_plane(points: Array) -> bool:

@@ -13,8 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse.linalg import splu
 
-from shadowpuppet.calibration.solve.normal_equations import covariance_of, solution
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector
@@ -118,7 +119,7 @@ def _adjusted(start: Bundle, seen: Observations, free: Free) -> Solved:
         H, g = _normal(jacobian, residuals, scale)
         stepped, new = False, cost
         for _ in range(12):
-            step = solution(H + damping * np.diag(np.maximum(np.diag(H), 1e-12)), g, columns.shared)
+            step = splu((H + damping * diags_array(np.maximum(H.diagonal(), 1e-12))).tocsc()).solve(g)
             tried = _moved(bundle, step, columns)
             off, jac = _linearised(tried, seen, columns)
             new = _cost(off, scale) if np.isfinite(off).all() else np.inf
@@ -135,12 +136,12 @@ def _adjusted(start: Bundle, seen: Observations, free: Free) -> Solved:
     return _result(bundle, residuals, jacobian, scale, columns)
 
 
-def _result(bundle: Bundle, residuals: Array, jacobian: object, scale: float, columns: _Columns) -> Solved:
+def _result(bundle: Bundle, residuals: Array, jacobian: csr_array, scale: float, columns: _Columns) -> Solved:
     C = len(bundle.cameras)
     place, angle, delay, lens = np.zeros(C), np.zeros(C), np.zeros(C), np.zeros(C)
     if columns.total:
         H, _ = _normal(jacobian, residuals, scale)
-        covariance = covariance_of(H, columns.shared)
+        covariance = _covariance(H, columns)
         for c, camera in enumerate(bundle.cameras):
             if (k := columns.places[c]) >= 0:
                 # centre = -R' t: with R <- exp(w) R and t <- t + d it moves by -R' (d + t x w)
@@ -173,10 +174,8 @@ def _columns(bundle: Bundle, free: Free) -> _Columns:
     return _Columns(places, numbered(free.boards, [6] * B), delays, lenses, coefficients, shared, at)
 
 
-def _linearised(bundle: Bundle, seen: Observations, columns: _Columns) -> tuple[Array, object]:
+def _linearised(bundle: Bundle, seen: Observations, columns: _Columns) -> tuple[Array, csr_array]:
     """Residuals (M, 2) and the sparse derivatives (2 M, P) of the predictions."""
-    from scipy.sparse import csr_array
-
     M = len(seen.camera)
     out = np.full((M, 2), np.nan)
     R_b, t_b = bundle.boards[:, :3, :3], bundle.boards[:, :3, 3]
@@ -203,7 +202,7 @@ def _linearised(bundle: Bundle, seen: Observations, columns: _Columns) -> tuple[
         rotated = world[which] @ R.T
         points = rotated + t
         if (points[:, 2] < 1e-6).any():
-            return out, None
+            return out, csr_array((2 * M, columns.total))
         pixels, by_point, by_lens = projected(camera, points)
         out[which] = seen.pixels[which] - pixels - bundle.delays[n] * -seen.velocities[which]
         same = np.full(len(which), 0)
@@ -213,7 +212,7 @@ def _linearised(bundle: Bundle, seen: Observations, columns: _Columns) -> tuple[
         put(which, same + columns.delays[n], -seen.velocities[which][:, :, None])
         put(which, same + columns.lenses[n], by_lens[:, :, columns.coefficients[n]])
     if not columns.total:
-        return out, None
+        return out, csr_array((2 * M, 0))
     table = csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))), shape=(2 * M, columns.total))
     return out, table
 
@@ -279,9 +278,21 @@ def _cost(residuals: Array, scale: float) -> float:
     return float(np.where(size <= HUBER, size**2, 2 * HUBER * size - HUBER**2).sum())
 
 
-def _normal(jacobian: object, residuals: Array, scale: float) -> tuple[Array, Array]:
+def _normal(jacobian: csr_array, residuals: Array, scale: float) -> tuple[csc_array, Array]:
     size = np.linalg.norm(residuals, axis=1) / scale
     weights = np.repeat(np.where(size <= HUBER, 1.0, HUBER / np.maximum(size, 1e-12)), 2) / scale**2
-    weighted = jacobian.multiply(weights[:, None])  # pyright: ignore[reportAttributeAccessIssue]
-    H = (weighted.T @ jacobian).toarray()
-    return np.asarray(H, float), np.asarray(weighted.T @ residuals.ravel(), float)
+    weighted = jacobian.multiply(weights[:, None])
+    return (weighted.T @ jacobian).tocsc(), np.asarray(weighted.T @ residuals.ravel(), float)
+
+
+def _covariance(H: csc_array, columns: _Columns) -> Array:
+    """Covariance of the columns that are not boards', which are taken out (Schur's complement); infinite where the observations say
+    nothing."""
+    first = columns.shared
+    S = H[:first, :first].toarray()
+    try:
+        if first < columns.total:
+            S = S - H[:first, first:] @ splu(H[first:, first:]).solve(H[first:, :first].toarray())
+        return np.asarray(np.linalg.pinv(S, hermitian=True), float)
+    except (RuntimeError, np.linalg.LinAlgError):  # singular
+        return np.diag(np.full(first, np.inf))

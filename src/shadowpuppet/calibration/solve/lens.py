@@ -11,8 +11,8 @@ import numpy as np
 
 from shadowpuppet.calibration.boards.board import Board
 from shadowpuppet.calibration.boards.detection import View
-from shadowpuppet.calibration.solve.board_pose import board_poses, pose_error
-from shadowpuppet.calibration.solve.bundle import Bundle, Free, Observations, adjust
+from shadowpuppet.calibration.solve.board_pose import board_poses
+from shadowpuppet.calibration.solve.bundle import Bundle, Free, Observations, Solved, adjust
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, transform
@@ -117,13 +117,22 @@ def solve_lens(name: str, board: Board, views: Sequence[View], size: tuple[int, 
         raise CalibrationError(f"camera {name!r}: no lens explains the {len(chosen)} views of the board ({board.text}): are its numbers of "
                                "squares and its dictionary those of the board that was filmed?")
     lens = _without_outliers(name, board, size, best, chosen)
-    return _described(board, lens, best, float(np.sqrt(np.median(errors))))
+    return _described(lens, best, float(np.sqrt(np.median(errors))))
 
 
 class _Lens(NamedTuple):
-    camera: Camera
+    solved: Solved
+    seen: Observations
     views: list[View]
-    poses: list[Array]
+
+    @property
+    def camera(self) -> Camera:
+        return self.solved.bundle.cameras[0]
+
+    @property
+    def errors(self) -> Array:
+        """Mean square of each view's reprojection error, of shape (V,), pixels squared."""
+        return np.bincount(self.seen.board, (self.solved.residuals**2).sum(1)) / np.bincount(self.seen.board)
 
 
 def _held_out(name: str, board: Board, size: tuple[int, int], model: str, views: Sequence[View]) -> Array:
@@ -143,15 +152,19 @@ def _errors(camera: Camera, board: Board, views: Sequence[View]) -> Array:
     poses = {n: found[0] for n, view in enumerate(views) if (found := board_poses(camera, board, view))}
     if not poses:
         return out
-    seen = observations(board, [(0, b, views[n]) for b, n in enumerate(poses)])
-    try:
-        start = Bundle((camera,), np.array([pose.T for pose in poses.values()]), np.zeros(1))
-        solved = adjust(start, seen, Free([False], [True] * len(poses), [False], [False]))
-    except (CalibrationError, np.linalg.LinAlgError):
-        return out
-    squares = (solved.residuals**2).sum(1)
-    out[list(poses)] = np.bincount(seen.board, squares) / np.bincount(seen.board)
+    lens = _adjusted(board, camera, [views[n] for n in poses], [pose.T for pose in poses.values()], False)
+    out[list(poses)] = lens.errors if lens is not None else np.inf
     return out
+
+
+def _adjusted(board: Board, camera: Camera, views: list[View], poses: Sequence[Array], free: bool) -> _Lens | None:
+    """The poses of the board in each view and, if it is `free`, the lens, by bundle adjustment; None if a board is behind the camera."""
+    seen = observations(board, [(0, b, view) for b, view in enumerate(views)])
+    try:
+        start = Bundle((camera,), np.array(poses), np.zeros(1))
+        return _Lens(adjust(start, seen, Free([False], [True] * len(poses), [False], [free])), seen, views)
+    except (CalibrationError, np.linalg.LinAlgError):
+        return None
 
 
 def _is_better(errors: Array, others: Array) -> bool:
@@ -169,7 +182,7 @@ def _is_better(errors: Array, others: Array) -> bool:
 def _without_outliers(name: str, board: Board, size: tuple[int, int], model: str, views: Sequence[View]) -> _Lens:
     lens = _fitted(name, board, size, model, views)
     assert lens is not None
-    errors = np.array([pose_error(lens.camera, board, view, T) for view, T in zip(lens.views, lens.poses)])
+    errors = np.sqrt(lens.errors)
     keep = [view for view, error in zip(lens.views, errors) if error <= OUTLIER * np.median(errors)]
     if MIN_VIEWS <= len(keep) < len(lens.views):
         lens = _fitted(name, board, size, model, keep) or lens
@@ -185,16 +198,11 @@ def _fitted(name: str, board: Board, size: tuple[int, int], model: str, views: S
     held = [(view, pose) for view, pose in zip(views, poses) if pose is not None]
     if len(held) < 3:
         return None
-    used, T = [view for view, _ in held], np.array([pose for _, pose in held])
-    seen = observations(board, [(0, b, view) for b, view in enumerate(used)])
-    free = Free([False], [True] * len(T), [False], [True])
-    try:
-        bundle = adjust(Bundle((camera,), T, np.zeros(1)), seen, free).bundle
-    except (CalibrationError, np.linalg.LinAlgError):
+    lens = _adjusted(board, camera, [view for view, _ in held], [pose for _, pose in held], True)
+    if lens is None:
         return None
-    lens = bundle.cameras[0]
-    plausible = 0.1 * max(size) < lens.matrix[0, 0] < 30 * max(size) and abs(np.log(lens.matrix[0, 0] / lens.matrix[1, 1])) < 0.3
-    return _Lens(lens, used, list(bundle.boards)) if plausible else None
+    x, y = np.diag(lens.camera.matrix)[:2]
+    return lens if 0.1 * max(size) < x < 30 * max(size) and abs(np.log(x / y)) < 0.3 else None
 
 
 def _pinhole_start(name: str, board: Board, size: tuple[int, int], model: str,
@@ -258,16 +266,14 @@ def observations(board: Board, views: Sequence[tuple[int, int, View]], velocitie
                         np.concatenate([view.pixels for _, _, view in views]), np.concatenate(list(moving)))
 
 
-def _described(board: Board, lens: _Lens, model: str, held_out: float) -> LensFit:
-    T = np.array(lens.poses)
-    seen = observations(board, [(0, b, view) for b, view in enumerate(lens.views)])
-    solved = adjust(Bundle((lens.camera,), T, np.zeros(1)), seen, Free([False], [True] * len(T), [False], [True]))
+def _described(lens: _Lens, model: str, held_out: float) -> LensFit:
+    T, seen, solved = lens.solved.bundle.boards, lens.seen, lens.solved
     tilts = np.degrees(np.arccos(np.clip(np.abs(T[:, 2, 2]), 0, 1)))
     distances = np.linalg.norm(T[:, :3, 3], axis=1)
     size = np.array(lens.camera.size)
     cells = np.unique(np.clip((seen.pixels / size * CELLS).astype(int), 0, np.array(CELLS) - 1), axis=0)
     return LensFit(
-        camera=replace(solved.bundle.cameras[0], oriented=False), model=model, views=len(lens.views), held_out=held_out,
+        camera=replace(lens.camera, oriented=False), model=model, views=len(lens.views), held_out=held_out,
         rms=float(np.sqrt((solved.residuals**2).sum(1).mean())), focal_sd=float(solved.lens_sd[0]),
         coverage=len(cells) / (CELLS[0] * CELLS[1]), tilt=float(np.percentile(tilts, 90)),
         distances=float(np.percentile(distances, 95) / np.percentile(distances, 5)), corners=seen.pixels, residuals=solved.residuals,

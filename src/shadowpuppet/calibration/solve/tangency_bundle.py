@@ -69,7 +69,7 @@ class TangencyFit:
     """Share of these that are over `FAR_PIXELS` apart."""
 
 
-class _Hulls(NamedTuple):
+class Hulls(NamedTuple):
     """The convex hull of every silhouette as its camera sees it; the last corner is repeated."""
 
     rays: Array
@@ -80,7 +80,9 @@ class _Hulls(NamedTuple):
     """Pixels per radian near the middle, of the lens that `rays` belong to."""
 
 
-class _Pair(NamedTuple):
+class HullPair(NamedTuple):
+    """Two cameras that have silhouettes in the same sets."""
+
     first: int
     second: int
     sets: NDArray[np.int64]
@@ -97,17 +99,16 @@ def place_by_outlines(cameras: Sequence[Camera], rows: Sequence[Row], free: Sequ
     few tangents in common with others.
     """
     free = range(len(cameras)) if free is None else free
-    hulls = [_hulls(camera, [row[n] for row in rows]) for n, camera in enumerate(cameras)]
-    pairs = [_Pair(i, j, both) for i, j in combinations(range(len(cameras)), 2)
-             if len(both := np.flatnonzero(hulls[i].firm.any(1) & hulls[j].firm.any(1)))]
-    found = [_distances(cameras, hulls, pair) for pair in pairs]
+    hulls = [hulls_of(camera, [row[n] for row in rows]) for n, camera in enumerate(cameras)]
+    pairs = pairs_of(hulls)
+    found = [signed_distances(cameras, hulls, pair) for pair in pairs]
     _check(cameras, pairs, found, free)
     size = max(max(camera.size) for camera in cameras) / 1000
     value, deviations = np.zeros((len(cameras), PARAMETERS)), np.r_[np.repeat(rough, 3), rough_focal]
     for scale in LOSS_SCALES:
         value = _minimised(cameras, hulls, pairs, value, free, scale * size, deviations)
     now = _moved(cameras, value)
-    last = [_distances(now, hulls, pair) for pair in pairs]
+    last = [signed_distances(now, hulls, pair) for pair in pairs]
     sd = _deviations(now, hulls, pairs, last, free, LOSS_SCALES[-1] * size, deviations)
     values = np.concatenate([each[np.isfinite(each)] for each in last])
     return TangencyFit(cameras=tuple(now), before=_medians(len(cameras), pairs, found), after=_medians(len(cameras), pairs, last),
@@ -116,7 +117,7 @@ def place_by_outlines(cameras: Sequence[Camera], rows: Sequence[Row], free: Sequ
                        far=float((np.abs(values) > FAR_PIXELS * size).mean()))
 
 
-def _check(cameras: Sequence[Camera], pairs: Sequence[_Pair], found: Sequence[Array], free: Sequence[int]) -> None:
+def _check(cameras: Sequence[Camera], pairs: Sequence[HullPair], found: Sequence[Array], free: Sequence[int]) -> None:
     for n in free:
         count = sum(int(np.isfinite(each).sum()) for pair, each in zip(pairs, found) if n in pair[:2])
         if count < LEAST_TANGENTS:
@@ -124,7 +125,7 @@ def _check(cameras: Sequence[Camera], pairs: Sequence[_Pair], found: Sequence[Ar
                                    f"{LEAST_TANGENTS}: the person must be whole in the picture more often")
 
 
-def _hulls(camera: Camera, silhouettes: Row) -> _Hulls:
+def hulls_of(camera: Camera, silhouettes: Row) -> Hulls:
     """The hulls of one camera's silhouettes."""
     import cv2
 
@@ -140,14 +141,20 @@ def _hulls(camera: Camera, silhouettes: Row) -> _Hulls:
     most = max((len(rays) for rays, _ in corners), default=1)
     pad = [(np.concatenate([rays, np.repeat(rays[-1:], most - len(rays), 0)]), np.r_[firm, np.repeat(firm[-1:], most - len(firm))])
            for rays, firm in corners]
-    return _Hulls(np.array([rays for rays, _ in pad]), np.array([firm for _, firm in pad]), _focal(camera))
+    return Hulls(np.array([rays for rays, _ in pad]), np.array([firm for _, firm in pad]), _focal(camera))
+
+
+def pairs_of(hulls: Sequence[Hulls]) -> list[HullPair]:
+    """Every two cameras that have silhouettes in the same sets."""
+    return [HullPair(i, j, both) for i, j in combinations(range(len(hulls)), 2)
+            if len(both := np.flatnonzero(hulls[i].firm.any(1) & hulls[j].firm.any(1)))]
 
 
 def _focal(camera: Camera) -> float:
     return float(np.diag(camera.matrix)[:2].mean())
 
 
-def _rays(camera: Camera, hulls: _Hulls, sets: NDArray[np.int64]) -> Array:
+def _rays(camera: Camera, hulls: Hulls, sets: NDArray[np.int64]) -> Array:
     """Directions (P, K, 3) of some sets' hulls in the world, for the camera's own focal length."""
     rays, factor = hulls.rays[sets], hulls.focal / _focal(camera)
     if abs(factor - 1) > 1e-12:
@@ -155,7 +162,7 @@ def _rays(camera: Camera, hulls: _Hulls, sets: NDArray[np.int64]) -> Array:
     return rays @ camera.T_camera_world[:3, :3]
 
 
-def _distances(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pair: _Pair) -> Array:
+def signed_distances(cameras: Sequence[Camera], hulls: Sequence[Hulls], pair: HullPair) -> Array:
     """Signed distances (P, 2) of both pairs of outermost tangents, pixels; NaN at a picture's border, or where a baseline runs through or
     along the person."""
     out = np.full((len(pair.sets), 2), np.nan)
@@ -179,13 +186,13 @@ def _distances(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pair: _Pair) 
     return out
 
 
-def _minimised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], start: Array, free: Sequence[int],
+def _minimised(cameras: Sequence[Camera], hulls: Sequence[Hulls], pairs: Sequence[HullPair], start: Array, free: Sequence[int],
                scale: float, deviations: Array) -> Array:
     """Increments (C, PARAMETERS) of the cameras, of least loss, by Levenberg's and Marquardt's method with reweighting. deviations:
     (PARAMETERS,) of the prior; what has none stays."""
     value, damping, places = start, 1e-3, _places(free, deviations)
     prior = np.tile(1 / np.square(deviations[deviations > 0]), len(free))
-    found = [_distances(_moved(cameras, value), hulls, pair) for pair in pairs]
+    found = [signed_distances(_moved(cameras, value), hulls, pair) for pair in pairs]
     cost = _loss(found, scale) + float((prior * value.ravel()[places] ** 2).sum()) / 2
     for _ in range(STEPS):
         H, g = _normal(_linearised(cameras, hulls, pairs, value, found, free, deviations), value.size, scale)
@@ -195,7 +202,7 @@ def _minimised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequen
             step = np.linalg.solve(H + damping * np.diag(np.diag(H)), -g)
             tried = value.copy()
             tried.ravel()[places] += step
-            new = [_distances(_moved(cameras, tried), hulls, pair) for pair in pairs]
+            new = [signed_distances(_moved(cameras, tried), hulls, pair) for pair in pairs]
             least = _loss(new, scale) + float((prior * tried.ravel()[places] ** 2).sum()) / 2
             if least < cost:
                 gain = (cost - least) / cost
@@ -233,7 +240,7 @@ class _Linear(NamedTuple):
     """Of shape (K,)."""
 
 
-def _linearised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], value: Array, found: Sequence[Array],
+def _linearised(cameras: Sequence[Camera], hulls: Sequence[Hulls], pairs: Sequence[HullPair], value: Array, found: Sequence[Array],
                 free: Sequence[int], deviations: Array) -> Iterator[_Linear]:
     """The distances `found` at increments (C, PARAMETERS) of pairs with a `free` camera and, by differences, their derivatives; 0 by the
     increments of the others, and by those without a deviation in the prior, which stay."""
@@ -249,7 +256,7 @@ def _linearised(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Seque
         for side, n in moving:
             for k, camera in nudged[n].items():
                 there = [*now[:n], camera, *now[n + 1 :]]
-                slopes[PARAMETERS * side + k] = np.nan_to_num((_distances(there, hulls, pair)[known] - base[known]) / NUDGE)
+                slopes[PARAMETERS * side + k] = np.nan_to_num((signed_distances(there, hulls, pair)[known] - base[known]) / NUDGE)
         columns = np.concatenate([PARAMETERS * n + np.arange(PARAMETERS) for n in pair[:2]])
         yield _Linear(columns, slopes, base[known], np.repeat(pair.sets[:, None], 2, 1)[known])
 
@@ -269,7 +276,7 @@ def _normal(parts: Iterable[_Linear], size: int, scale: float) -> tuple[Array, A
     return H, g
 
 
-def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Sequence[_Pair], found: Sequence[Array],
+def _deviations(cameras: Sequence[Camera], hulls: Sequence[Hulls], pairs: Sequence[HullPair], found: Sequence[Array],
                 free: Sequence[int], scale: float, deviations: Array) -> Array:
     """Standard deviations (C, PARAMETERS) of the cameras' increments, rad, m and relative, from how much parts of the film
     would move them (a "sandwich" of gradients by blocks of sets: neighbouring silhouettes err together), and at least from an error
@@ -299,7 +306,7 @@ def _deviations(cameras: Sequence[Camera], hulls: Sequence[_Hulls], pairs: Seque
     return np.sqrt(own.reshape(-1, PARAMETERS))
 
 
-def _distinct(hulls: Sequence[_Hulls], shift: float) -> int:
+def _distinct(hulls: Sequence[Hulls], shift: float) -> int:
     """Number of sets that differ from all those counted before: in one camera at least the outline's middle is a `shift`, pixels, away."""
     middles = np.stack([each.focal * each.rays.mean(1)[:, :2] for each in hulls], 1)
     middles[~np.stack([each.firm.any(1) for each in hulls], 1)] = np.nan
@@ -332,7 +339,7 @@ def _moved_one(camera: Camera, increment: Array) -> Camera:
     return replace(camera, T_camera_world=there, matrix=camera.matrix * [factor, factor, 1] if factor != 1 else camera.matrix)
 
 
-def _medians(count: int, pairs: Sequence[_Pair], found: Sequence[Array]) -> Array:
+def _medians(count: int, pairs: Sequence[HullPair], found: Sequence[Array]) -> Array:
     own = [np.concatenate([np.abs(each[np.isfinite(each)]) for pair, each in zip(pairs, found) if n in pair[:2]] or [np.zeros(0)])
            for n in range(count)]
     return np.array([np.median(each) if len(each) else np.nan for each in own])

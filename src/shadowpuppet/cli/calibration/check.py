@@ -52,7 +52,7 @@ def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a ca
 
 
 def check_table(check: CalibrationCheck) -> RenderableType:
-    """How far each camera disagrees with the others, and the verdict."""
+    """Disagreement of each camera with the others, and the verdict."""
     found = check.agreement
     columns = ("camera", "disagrees by", "with", "late by", "90 % within", "")
     clock = "clock" if check.clock is None else check.clock.by

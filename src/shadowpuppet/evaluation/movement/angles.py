@@ -108,7 +108,7 @@ def cycles(times: Array, angles: Sequence[Angle], gait: Gait) -> list[Cycle]:
 
 
 def ranges(times: Array, angles: Sequence[Angle]) -> list[Range]:
-    """Ranges of angles at `times` (T,), seconds; without those that are never vouched for."""
+    """Ranges of angles at `times` (T,), seconds, without angles that are never vouched for."""
     found = []
     for angle in angles:
         known = angle.sure & np.isfinite(angle.degrees)
@@ -122,7 +122,7 @@ def ranges(times: Array, angles: Sequence[Angle]) -> list[Range]:
 
 
 def _over(times: Array, angle: Angle, stride: Stride) -> Array | None:
-    """An angle and its deviation (2, 101) over a stride; None if it is not one of those that a `Cycle` counts."""
+    """An angle and its deviation (2, 101) over a stride; None if a `Cycle` does not count it."""
     within = (times >= stride.begin - 1e-9) & (times <= stride.end + 1e-9)
     if not np.isfinite(angle.degrees[within]).all() or angle.sure[within].mean() < 1 - MOST_DOUBT:
         return None

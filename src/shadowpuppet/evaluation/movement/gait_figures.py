@@ -25,7 +25,7 @@ class Spread(NamedTuple):
     neighbouring frames are alike. NaN for times, whose error is not stated."""
 
 
-class Figure(NamedTuple):
+class GaitParameter(NamedTuple):
     """A quantity of a gait."""
 
     name: str
@@ -59,16 +59,16 @@ _STRIDES = (_Quantity("stride length", "m", lambda s: s.length, lambda s: s.leng
             _Quantity("stance", "%", lambda s: 100 * s.stance))
 
 
-def gait_figures(gait: Gait) -> list[Figure]:
+def gait_figures(gait: Gait) -> list[GaitParameter]:
     """All quantities of a gait; none without a full stride."""
     if not gait.strides:
         return []
     return [_figure(each, of) for of, quantities in ((gait.strides, _STRIDES), (gait.counted, _STEPS)) for each in quantities]
 
 
-def _figure(quantity: _Quantity, of: Sequence[Any]) -> Figure:
+def _figure(quantity: _Quantity, of: Sequence[Any]) -> GaitParameter:
     by_side = {side: [each for each in of if each.side == side] for side in SIDES}
-    return Figure(quantity.name, quantity.unit, *(_spread(quantity, own) for own in (*by_side.values(), of)))
+    return GaitParameter(quantity.name, quantity.unit, *(_spread(quantity, own) for own in (*by_side.values(), of)))
 
 
 def _spread(quantity: _Quantity, of: Sequence[Any]) -> Spread:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.evaluation.movement.angles import PERCENT, Cycle, Range, cycles, joint_angles, ranges
-from shadowpuppet.evaluation.movement.gait_figures import Figure, gait_figures
+from shadowpuppet.evaluation.movement.gait_figures import GaitParameter, gait_figures
 from shadowpuppet.evaluation.movement.normal_walking import Normal, normal_walking
 from shadowpuppet.io.files.table import cells, csv_line
 from shadowpuppet.io.files.text import write_whole
@@ -29,13 +29,13 @@ SHORTEST = 3
 
 @dataclass(frozen=True, eq=False)
 class Movement:
-    """What a run says about the movement."""
+    """Gait, angles and ranges of the movement in a run."""
 
     gait: Gait | None
     """None if the run has no contacts of feet."""
     no_gait: str
     """Why there are no figures of a gait; empty if there are."""
-    figures: Sequence[Figure]
+    figures: Sequence[GaitParameter]
     cycles: Sequence[Cycle]
     """Angles over the gait cycle; none without a full stride."""
     ranges: Sequence[Range]
@@ -61,7 +61,7 @@ def gait_of(run: Run) -> tuple[Gait | None, str]:
 
 
 def _strikes_text(gait: Gait) -> str:
-    """How often feet strike the floor, and what becomes of the steps between."""
+    """Number of foot strikes, and of the steps between them that count, in words."""
     if not any(gait.strikes.values()):
         return "no foot strikes the floor"
     return " and ".join(f"{gait.strikes[side]} of the {side} foot" for side in SIDES) + f" strike the floor; {left_out_text(gait)}"
@@ -77,7 +77,7 @@ def movement_of(run: Run) -> Movement:
 
 
 def left_out_text(gait: Gait) -> str:
-    """How many steps count, and why others do not."""
+    """Number of steps that count, and reasons for leaving out the others."""
     reasons = ", ".join(f"{count} {reason}" for reason, count in gait.left_out.items())
     return f"{len(gait.counted)} of {len(gait.steps)} steps count" + (f"; left out: {reasons}" if reasons else "")
 

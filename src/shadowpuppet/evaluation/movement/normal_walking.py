@@ -1,4 +1,4 @@
-"""Angles over the gait cycle of people who walk without complaint, to be seen beside those of a run.
+"""Angles over the gait cycle of healthy adults, for comparison with a run's.
 
 24 young adults (21 to 37 years) at a comfortable speed over ground, right leg: the open data of Fukuchi, Fukuchi & Duarte (2018, PeerJ
 6:e4640, doi:10.6084/m9.figshare.5722711, CC BY 4.0), means and standard deviations between people as in the package PhysioGaitNorm.

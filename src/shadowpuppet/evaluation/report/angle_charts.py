@@ -10,7 +10,7 @@ from shadowpuppet.evaluation.error_metrics import hinge_angles
 from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.evaluation.movement.angles import PERCENT, Cycle
 from shadowpuppet.evaluation.movement.normal_walking import Normal
-from shadowpuppet.evaluation.report.drawing import BLUE, POINTS, SIDES, Drawing, binned, span, svg
+from shadowpuppet.evaluation.report.drawing import BLUE, POINTS, SIDES, binned, drawing, legend_above, span, svg
 from shadowpuppet.geometry import evenly_spread
 from shadowpuppet.io.intervals import HALF_WIDTH
 from shadowpuppet.io.motion.table import dof_unit
@@ -26,7 +26,7 @@ def angles_over_time(of: Evaluation) -> str:
     angles = [(d, name) for d, name in enumerate(motion.dof_names) if dof_unit(name) == "rad"]
     panels = list(dict.fromkeys(name.removeprefix("left_").removeprefix("right_") for _, name in angles))
     rows = -(-len(panels) // COLUMNS)
-    with Drawing("angles", (10, 0.4 + 1.45 * rows), rows, (1,) * rows, COLUMNS) as (figure, grid):
+    with drawing("angles", (10, 0.4 + 1.45 * rows), rows, (1,) * rows, COLUMNS) as (figure, grid):
         places = dict(zip(panels, grid.flat))
         for axes in list(grid.flat)[len(panels) :]:
             axes.set_axis_off()
@@ -41,8 +41,7 @@ def angles_over_time(of: Evaluation) -> str:
             axes.set_title(panel.replace("_", " "), fontsize=9, loc="left", pad=3)
             axes.set_xlim(*span(motion.times))
             axes.tick_params(labelsize=8)
-        drawn = {label: handle for axes in places.values() for handle, label in zip(*axes.get_legend_handles_labels())}
-        figure.legend(drawn.values(), drawn.keys(), loc="outside upper center", ncols=len(drawn))
+        legend_above(figure, places.values())
         return svg(figure, "angles")
 
 
@@ -53,7 +52,7 @@ def bland_altman(of: Evaluation) -> str:
     assert of.truth is not None
     pairs = hinge_angles(of.table, of.truth)
     hinges = list(dict.fromkeys(name.partition("_")[2] for name in pairs))
-    with Drawing("agreement", (10, 3.2), columns=len(hinges)) as (figure, grid):
+    with drawing("agreement", (10, 3.2), columns=len(hinges)) as (figure, grid):
         for name, (ours, theirs) in pairs.items():
             side, _, hinge = name.partition("_")
             axes, colour, off = grid.flat[hinges.index(hinge)], SIDES[side], ours - theirs
@@ -64,17 +63,16 @@ def bland_altman(of: Evaluation) -> str:
                 axes.axhline(off.mean() + limit * off.std(), color=colour, lw=1, ls="--")
             axes.set_title(hinge, fontsize=9, loc="left", pad=3)
             axes.set(xlabel="mean of run and truth, degrees", ylabel="run less truth, degrees")
-        drawn = {label: handle for axes in grid.flat for handle, label in zip(*axes.get_legend_handles_labels())}
-        figure.legend(drawn.values(), drawn.keys(), loc="outside upper center", ncols=len(drawn), markerscale=3)
+        legend_above(figure, grid.flat, markerscale=3)
         return svg(figure, "agreement")
 
 
 def gait_cycle(cycles: Sequence[Cycle], normal: Callable[[Cycle], Normal | None], stance: Mapping[str, float]) -> str:
-    """Every angle over the gait cycle, both sides in one panel, before the band of what is normal, one standard deviation to each side, and
+    """Every angle over the gait cycle, both sides in one panel, before the band of normal angles, one standard deviation to each side, and
     with `stance`, % of the cycle by side, dotted."""
     panels = list(dict.fromkeys(each.name for each in cycles))
     rows = -(-len(panels) // COLUMNS)
-    with Drawing("cycle", (10, 0.6 + 1.6 * rows), rows, (1,) * rows, COLUMNS) as (figure, grid):
+    with drawing("cycle", (10, 0.6 + 1.6 * rows), rows, (1,) * rows, COLUMNS) as (figure, grid):
         places = dict(zip(panels, grid.flat))
         for axes in list(grid.flat)[len(panels) :]:
             axes.set_axis_off()
@@ -92,6 +90,5 @@ def gait_cycle(cycles: Sequence[Cycle], normal: Callable[[Cycle], Normal | None]
             axes.set_title(name, fontsize=9, loc="left", pad=3)
             axes.set(xlim=(0, 100), xticks=(0, 25, 50, 75, 100))
             axes.tick_params(labelsize=8)
-        drawn = {label: handle for axes in places.values() for handle, label in zip(*axes.get_legend_handles_labels())}
-        figure.legend(drawn.values(), drawn.keys(), loc="outside upper center", ncols=len(drawn))
+        legend_above(figure, places.values())
         return svg(figure, "cycle")

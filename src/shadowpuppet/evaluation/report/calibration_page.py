@@ -41,7 +41,7 @@ def _parts(found: Calibrated, name: str) -> Iterator[str]:
     if found.placement is not None:
         yield "<h2>Places</h2>" + _place_table(found)
         yield figure(_map(found), "From above: cameras and their directions, and where the board was (grey).")
-        yield "<h3>Pairs</h3><p class=said>Moments in which two cameras see the board together, and those that agree.</p>"
+        yield "<h3>Pairs</h3><p class=said>Moments in which two cameras see the board together, and moments that agree.</p>"
         yield _pair_table(found)
 
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.evaluation.error_metrics import true_stretches
 from shadowpuppet.evaluation.evaluation import Evaluation
-from shadowpuppet.evaluation.report.drawing import BLUE, GREEN, INK, ORANGE, SIDES, Drawing, binned, span, svg
+from shadowpuppet.evaluation.report.drawing import BLUE, GREEN, INK, ORANGE, SIDES, binned, drawing, legend_above, span, svg
 from shadowpuppet.geometry import Array
+from shadowpuppet.motion.interpolation import true_runs
 from shadowpuppet.motion.metrics import accelerations
 
 STATUSES = {"tracked": "#dfe6ee", "uncertain": "#F0C75E", "predicted": "#9ECAE1", "lost": ORANGE, "absent": "#b9bdc4"}
@@ -25,7 +25,7 @@ def over_time(of: Evaluation, marks: Mapping[str, float]) -> str:
     errors, times = 1000 * np.where(of.errors.known, of.errors.distance, np.nan), of.table.times
     known = np.isfinite(errors).any(1)
     t, low, quarter, middle, high, top = binned(times[known], _spread(errors[known]))
-    with Drawing("time", (10, 3.7), rows=2, ratios=(14, 1)) as (figure, (axes, strip)):
+    with drawing("time", (10, 3.7), rows=2, ratios=(14, 1)) as (figure, (axes, strip)):
         axes.fill_between(t, low, top, color=BLUE, alpha=0.13, lw=0, label="all joints")
         axes.fill_between(t, quarter, high, color=BLUE, alpha=0.25, lw=0, label="middle half")
         axes.plot(t, middle, color=BLUE, label="mean")
@@ -49,7 +49,7 @@ def by_joint_and_time(of: Evaluation) -> str:
     assert of.errors is not None
     errors, times = 1000 * np.where(of.errors.known, of.errors.distance, np.nan), of.table.times
     t, *rows = binned(times, [np.where(of.errors.lost[:, j], np.nan, errors[:, j]) for j in range(errors.shape[1])])
-    with Drawing("map", (10, 0.6 + 0.21 * len(rows))) as (figure, axes):
+    with drawing("map", (10, 0.6 + 0.21 * len(rows))) as (figure, axes):
         from matplotlib import colormaps
 
         masked = np.ma.masked_invalid(rows)
@@ -73,7 +73,7 @@ def by_joint(of: Evaluation) -> str:
     assert of.errors is not None
     kept = [(name, 1000 * of.errors.distance[of.errors.known[:, j], j]) for j, name in enumerate(of.errors.names)]
     kept = [(name, values) for name, values in kept if len(values)]
-    with Drawing("joints", (5.2, 0.9 + 0.26 * len(kept))) as (figure, axes):
+    with drawing("joints", (5.2, 0.9 + 0.26 * len(kept))) as (figure, axes):
         for row, (name, values) in enumerate(kept):
             p5, p25, p50, p75, p95 = np.percentile(values, [5, 25, 50, 75, 95])
             colour = SIDES.get(name.split("_")[0], BLUE)
@@ -90,7 +90,7 @@ def by_joint(of: Evaluation) -> str:
 
 def shares(distances: Mapping[str, Array], known: NDArray[np.bool_]) -> str:
     """Share of joints below each error, after each alignment."""
-    with Drawing("shares", (5.2, 3.5)) as (figure, axes):
+    with drawing("shares", (5.2, 3.5)) as (figure, axes):
         far = max(float(np.percentile(1000 * distances["none"][known], 98)), 1.0)
         limits = np.linspace(0, far, 300)
         for way, (label, colour, dash) in WAYS.items():
@@ -108,7 +108,7 @@ def path_of(of: Evaluation, joint: str) -> str:
     assert of.table is not None
     assert of.truth is not None
     ours, theirs = (table.select([joint]).positions[:, 0] for table in (of.table, of.truth))
-    with Drawing("path", (10, 3.9), rows=3, ratios=(1, 1, 1)) as (figure, panels):
+    with drawing("path", (10, 3.9), rows=3, ratios=(1, 1, 1)) as (figure, panels):
         for k, (axes, name) in enumerate(zip(panels, "xyz")):
             t, run, truth = binned(of.table.times, [ours[:, k], theirs[:, k]])
             axes.plot(t, truth, color=INK, lw=1.2, label="truth")
@@ -116,7 +116,7 @@ def path_of(of: Evaluation, joint: str) -> str:
             axes.set_ylabel(f"{name}, m")
             axes.set_xlim(*span(t))
             axes.tick_params(labelbottom=k == 2)
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+        legend_above(figure, panels[:1])
         panels[2].set_xlabel("time, s")
         return svg(figure, "path")
 
@@ -128,7 +128,7 @@ def jitter_by_joint(of: Evaluation) -> str:
     assert of.errors is not None
     names = of.errors.names
     sizes = [_size(accelerations(table.select(names))) for table in (of.table, of.truth)]
-    with Drawing("jitter", (5.2, 0.9 + 0.26 * len(names))) as (figure, axes):
+    with drawing("jitter", (5.2, 0.9 + 0.26 * len(names))) as (figure, axes):
         rows = np.arange(len(names))
         axes.hlines(rows, sizes[1], sizes[0], color="#d3d8df", lw=2.2)
         axes.plot(sizes[1], rows, "o", color=INK, ms=5, label="truth")
@@ -137,7 +137,7 @@ def jitter_by_joint(of: Evaluation) -> str:
         axes.invert_yaxis()
         axes.grid(axis="y", visible=False)
         axes.set(xlabel="acceleration, m/s² (rms)", xlim=(0, None))
-        figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=2)
+        legend_above(figure, [axes])
         return svg(figure, "jitter")
 
 
@@ -146,7 +146,7 @@ def fit_over_time(of: Evaluation) -> str:
     motion, several = of.run.motion, "cost_m2" in of.measured
     scale, unit = (1e4, "cm²") if several else (1.0, "pixels")
     t, overlap, cost = binned(motion.times, [motion.overlap, scale * motion.cost])
-    with Drawing("fit", (10, 2.7), rows=2, ratios=(1, 1)) as (figure, (above, below)):
+    with drawing("fit", (10, 2.7), rows=2, ratios=(1, 1)) as (figure, (above, below)):
         above.plot(t, overlap, color=GREEN)
         low = float(np.nanmin(overlap)) if np.isfinite(overlap).any() else 0.0
         above.set(ylabel="overlap", ylim=(max(0.0, low - 0.05), 1))
@@ -160,7 +160,7 @@ def fit_over_time(of: Evaluation) -> str:
 
 def coverage_chart(coverage: Mapping[str, Any], levels: Sequence[str]) -> str:
     """Found against stated coverage of the intervals."""
-    with Drawing("coverage", (3.6, 3.3)) as (figure, axes):
+    with drawing("coverage", (3.6, 3.3)) as (figure, axes):
         stated = [float(level) for level in levels]
         axes.plot([0, 100], [0, 100], color="#c4c9d0", lw=1.2, label="honest")
         axes.plot(stated, [100 * coverage[f"within_{level}"] for level in levels], "o-", color=BLUE, label="this run")
@@ -183,7 +183,7 @@ def _statuses(axes: Any, of: Evaluation) -> dict[str, Any]:
     step = float(np.median(np.diff(motion.times))) if len(motion) > 1 else 1.0
     handles = {}
     for status in motion.status_counts:
-        bars = [(motion.times[first] - step / 2, (end - first) * step) for first, end in true_stretches(motion.status == status)]
+        bars = [(motion.times[first] - step / 2, (end - first) * step) for first, end in true_runs(motion.status == status)]
         handles[status] = axes.broken_barh(bars, (0, 1), facecolors=STATUSES[status], lw=0)
     axes.set(ylim=(0, 1), yticks=[], xlabel="time, s")
     axes.grid(False)

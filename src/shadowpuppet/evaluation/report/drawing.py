@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,30 +26,26 @@ STYLE = {"svg.fonttype": "none", "font.size": 9.5, "axes.edgecolor": "#c4c9d0", 
          "lines.linewidth": 1.5}  # fmt: skip
 
 
-class Drawing:
-    """Context of a matplotlib figure with panels, in our style."""
+@contextlib.contextmanager
+def drawing(name: str, size: tuple[float, float], rows: int = 1, ratios: Sequence[float] = (1,),
+            columns: int | None = None) -> Iterator[tuple[Any, Any]]:
+    """A matplotlib figure with panels, in our style: `name`: of the figure, for its ids; `size`: inches; `rows` of panels with `ratios` of
+    heights; `columns`: None for one, whose panels then are a plain array."""
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
 
-    def __init__(self, name: str, size: tuple[float, float], rows: int = 1, ratios: Sequence[float] = (1,),
-                 columns: int | None = None) -> None:
-        """`name`: of the figure, for its ids; `size`: inches; `rows` of panels with `ratios` of heights; `columns`: None for one, whose
-        panels then are a plain array."""
-        from matplotlib import rc_context
-
-        style: dict[Any, Any] = {**STYLE, "svg.hashsalt": name}
-        self._context = rc_context(style)
-        self._size, self._rows, self._ratios, self._columns = size, rows, ratios, columns
-
-    def __enter__(self) -> tuple[Any, Any]:
-        from matplotlib.backends.backend_svg import FigureCanvasSVG
-        from matplotlib.figure import Figure
-
-        self._context.__enter__()
-        figure = Figure(figsize=self._size, layout="constrained")
+    style: dict[Any, Any] = {**STYLE, "svg.hashsalt": name}
+    with rc_context(style):
+        figure = Figure(figsize=size, layout="constrained")
         FigureCanvasSVG(figure)
-        return figure, figure.subplots(self._rows, self._columns or 1, height_ratios=self._ratios, squeeze=self._columns is None)
+        yield figure, figure.subplots(rows, columns or 1, height_ratios=ratios, squeeze=columns is None)
 
-    def __exit__(self, *error: Any) -> None:
-        self._context.__exit__(*error)
+
+def legend_above(figure: Any, panels: Iterable[Any], **more: Any) -> None:
+    """A legend above all panels, each label once."""
+    drawn = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels())}
+    figure.legend(drawn.values(), drawn.keys(), loc="outside upper center", ncols=len(drawn), **more)
 
 
 def svg(figure: Any, name: str) -> str:

@@ -25,14 +25,14 @@ def plain(text: object) -> str:
 
 
 def figure(svg: str, caption: str) -> str:
-    """A plot with a caption, which also describes it to those who cannot see it."""
+    """A plot with a caption, which is also its description for screen readers."""
     said = plain(re.sub(r"<[^>]*>", "", caption).partition(". ")[0])
     named = svg if "aria-label" in svg else svg.replace('role="img"', f'role="img" aria-label="{said}"', 1)
     return f"<figure>{scrolled(named, said)}<figcaption>{caption}</figcaption></figure>"
 
 
 def scrolled(content: str, name: str) -> str:
-    """What may be wider than a phone's screen, and scrolls by itself there; also by keys. `name`: escaped."""
+    """Content that scrolls sideways on narrow screens, also by keys. `name`: escaped."""
     return f'<div class="scroll" role="region" aria-label="{name}" tabindex="0">{content}</div>'
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from shadowpuppet.body.skeleton import SIDES
-from shadowpuppet.evaluation.movement.gait_figures import Figure, Spread
+from shadowpuppet.evaluation.movement.gait_figures import GaitParameter, Spread
 from shadowpuppet.evaluation.movement.movement import Movement, left_out_text
 from shadowpuppet.evaluation.report import angle_charts
 from shadowpuppet.evaluation.report.html import figure, plain, rows, table
@@ -55,7 +55,7 @@ def _stance(gait: Gait) -> dict[str, float]:
     return {side: float(np.mean(own)) for side, own in shares.items() if own}
 
 
-def _cells(each: Figure) -> list[str]:
+def _cells(each: GaitParameter) -> list[str]:
     decimals = 1 if each.unit in ("%", "steps/min") else 3
     symmetry = "" if np.isnan(each.symmetry) or each.name == "step width" else f"{each.symmetry:+.1f}"
     stated = "" if np.isnan(each.both.stated) else f"± {each.both.stated:.{decimals}f}"

@@ -143,7 +143,7 @@ def _joints(of: Evaluation) -> Iterator[str]:
     distances = aligned_distances(of.errors, of.table, of.truth)
     left = figure(charts.by_joint(of), "Half of the frames lie in the box, nine tenths on the line; the stroke is the median, the ring the "
                                        "mean. Green is the person's left, pink the right.")
-    right = figure(charts.shares(distances, of.errors.known), "How many joints are nearer than so much, as they stand and in posture "
+    right = figure(charts.shares(distances, of.errors.known), "Share of joints with less than each error, as they stand and in posture "
                                                               "alone.")
     yield f'<div class="pair">{left}{right}</div>'
     yield (f'<div class="pair"><div><h3>Laid over each other</h3>{alignments_table(of)}</div>'
@@ -160,7 +160,7 @@ def _motion(of: Evaluation) -> Iterator[str]:
     moves = of.measured["acceleration"]
     if moves:
         text = (f"<p>The run's joints accelerate by {moves['run_m_s2']:.1f} m/s² (root mean square), the truth's by "
-                f"{moves['truth_m_s2']:.1f}. What is more is jitter, what is less has been smoothed away. The difference between the two, "
+                f"{moves['truth_m_s2']:.1f}. More than the truth's is jitter, less is smoothed away. The difference between the two, "
                 f"as vectors, is {moves['difference_m_s2']:.1f} m/s² in the mean. Compare runs of one film, at one frame rate.</p>")
         yield f'<div class="pair">{figure(charts.jitter_by_joint(of), "Accelerations by joint.")}<div>{text}</div></div>'
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.bones import BONES
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import BLACK, WHITE, colour_of, draw_bone, in_colour, write_text
 from shadowpuppet.errors import ShadowPuppetError
@@ -33,7 +33,7 @@ WORST, TYPICAL, MAX_LOST = 6, 2, 2
 SPACING = 0.5
 """Seconds between the worst frames; less in short runs, more in long ones."""
 MAX_VIEWS = 5
-"""Cameras shown side by side: those that see the person largest."""
+"""Cameras shown side by side: the person is largest in them."""
 MAX_WIDTH = 1280
 """Largest width of a picture in the page, pixels."""
 MIN_HEIGHT = 440

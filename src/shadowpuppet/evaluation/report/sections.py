@@ -22,10 +22,8 @@ def _cards(of: Evaluation) -> Iterator[tuple[str, str, str, str]]:
     if (verdict := of.run.metrics.get("verdict")) is not None:
         yield "The run's own verdict", plain(verdict["word"]), "", plain("; ".join(verdict["reasons"]) or "nothing speaks against it")
     if of.errors is not None:
-        errors, aligned, human, moves = (measured[key] for key in ("errors", "aligned_mm", "humaneva", "acceleration"))
+        errors, aligned, moves = (measured[key] for key in ("errors", "aligned_mm", "acceleration"))
         yield "Joint error", f"{errors['mean_mm']:.1f}", "mm", f"mean of {len(errors['joints'])} joints; rmse {errors['rmse_mm']:.1f}"
-        if "mean_mm" in human:
-            yield "HumanEva", f"{human['mean_mm']:.1f}", "mm", f"mean of its 15 joints; sd over frames {human['sd_mm']:.1f}"
         yield "Posture alone", f"{aligned['rigid']:.1f}", "mm", "each frame moved and turned onto the truth"
         if "depth_mm" in errors:
             yield "Depth", f"{errors['depth_mm']:.1f}", "mm", f"along the camera's axis; {errors['plane_mm']:.1f} across it"
@@ -136,9 +134,7 @@ def definitions_section(of: Evaluation) -> str:
             ("Joint error", "Distance between a joint and its truth. The mean is over all frames and joints of the truth; where the run "
                             f"has no pose, each joint counts {1000 * LOST_ERROR:.0f} mm, so that leaving out bad frames never helps. "
                             "<span class=formula>rmse = √(mean of d²)</span>."),
-            ("HumanEva", "The mean distance over 15 joints (pelvis, neck, head; shoulders, elbows, wrists, hips, knees, ankles) in each "
-                         "frame, then over the frames (Sigal, Balan and Black 2010)."),
-            ("Laid over each other", "Run and truth compared after less and less is asked of the run: one rigid motion of the whole; each "
+            ("Laid over each other", "Run and truth compared after ever freer alignments: one rigid motion of the whole; each "
                                      f"frame's mean offset; distances from the {root}; the best rigid motion of each frame (Procrustes); "
                                      "that with a scale, which papers call PA-MPJPE. The first alone says where the person was."),
             ("Acceleration", "Root mean square of second differences of the joints' places, of run and truth at the same times."),

@@ -115,7 +115,7 @@ def examine_calibration(path: str | Path, unit: str | None = None, up: str | Non
 
 
 def _check_places(path: Path, found: Drafts) -> None:
-    """Raise `CalibrationError` for several cameras of which one has no place."""
+    """Raise `CalibrationError` for several cameras if one has no place."""
     bare = [draft.name for draft in found.drafts if draft.T is None]
     if bare and len(found.drafts) > 1:
         unused = f"; stated there but not used: {shorten(dict.fromkeys(map(printable, found.unused)))}" if found.unused else ""
@@ -163,7 +163,7 @@ def _guessed(draft: Draft, notes: list[str]) -> tuple[float, float]:
     """Guess the size (width, height) of a camera's pictures as twice the principal point, or the nearest of `SIZES`; adds a note."""
     if draft.fov is not None:
         raise CalibrationError("size: missing, expected the pictures' width and height in pixels, such as size = [1920, 1080]; in a "
-                               "recording the films tell it")
+                               "recording the films state it")
     twice = 2 * np.asarray(draft.matrix, float)[:2, 2] + 1
     if not (np.isfinite(twice).all() and (twice >= 2).all() and (twice < 1e5).all()):
         raise CalibrationError(f"found no picture size, and a principal point of {((twice - 1) / 2).tolist()}, expected one in the picture")

@@ -49,7 +49,7 @@ def read_colmap(path: Path) -> Drafts:
             drafts[name] = Draft(name=name, matrix=matrix, distortion=distortion, T=_pose(file, n, pose), size=size, fisheye=fisheye)
     if not drafts:
         raise CalibrationError(f"{file}: found no picture in it, expected lines of IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")
-    note = "COLMAP's lengths are in a unit of its own: multiply the translations by what the person's true height is over that of `check`"
+    note = "COLMAP's lengths are in a unit of its own: multiply the translations by the person's true height over the height in `check`"
     return Drafts(tuple(drafts.values()), None, (note,))
 
 

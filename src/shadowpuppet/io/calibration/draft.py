@@ -11,6 +11,7 @@ import numpy as np
 
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array
+from shadowpuppet.io.files.table import COMMA
 from shadowpuppet.io.files.text import TOML_LIMIT, read_limited
 
 
@@ -58,9 +59,18 @@ def text_of(path: Path) -> str:
 
 
 def numbers_of(text: str | None, counts: Sequence[int]) -> Array | None:
-    """Finite numbers (n,) from text separated by blanks or commas; None for other text, or if n is not in `counts`."""
+    """Finite numbers (n,) from text separated by blanks or commas, or with decimal commas; None for other text, if n is not in `counts`, or
+    if commas between digits may be either."""
+    words = (text or "").split()
+    parts = (text or "").replace(",", " ").split()
+    cells = [word.rstrip(",") for word in words]
+    if any(map(COMMA.fullmatch, cells)) and all(cell.count(",") < 2 for cell in cells):
+        listed = (len(words) == 1 or cells != words) and len(parts) in counts
+        if listed and len(words) in counts:
+            return None
+        parts = parts if listed else [cell.replace(",", ".") for cell in cells]
     try:
-        values = np.array((text or "").replace(",", " ").split(), float)
+        values = np.array(parts, float)
     except ValueError:
         return None
     return values if len(values) in counts and bool(np.isfinite(values).all()) else None

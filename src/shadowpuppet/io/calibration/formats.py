@@ -18,6 +18,7 @@ from shadowpuppet.io.calibration.pose2sim import read_tables
 from shadowpuppet.io.calibration.qualisys import read_qualisys
 from shadowpuppet.io.calibration.rough import ROUGH_NAME, is_rough, read_rough
 from shadowpuppet.io.calibration.vicon import read_vicon
+from shadowpuppet.io.files.text import encoding_of
 from shadowpuppet.removed import FILES
 
 ENDINGS = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".cal", ".calib", ".krt", ".pickle", ".pkl")
@@ -88,7 +89,7 @@ def format_of(path: Path) -> Format:
     if path.suffix.lower() in (".pickle", ".pkl") or (head[:1] == b"\x80" and head[1:2] in b"\2\3\4\5"):
         raise CalibrationError(f"{path}: is a pickle, as OpenCap saves calibrations: reading one runs any program that is in it, so it is "
                                "not opened here; where you trust it, Pose2Sim makes TOML of it (calibration type convert, from opencap)")
-    text = head.decode("utf-8", "replace")
+    text = head.decode(encoding_of(head) or "utf-8", "replace")
     kind = next((kind for kind in FORMATS if kind.fits(path, text)), None)
     if kind is None:
         raise CalibrationError(f"{path}: found no calibration in it that is known, expected one of: {'; '.join(f.name for f in FORMATS)}")
@@ -105,7 +106,7 @@ def is_calibration(path: Path) -> bool:
         return mentions_cameras(path)
     if path.is_file() and kind is TABLES:
         with path.open("rb") as file:
-            return b"matrix" in file.read(HEAD_BYTES)
+            return b"matrix" in file.read(HEAD_BYTES).replace(b"\0", b"")
     return True
 
 

@@ -59,11 +59,11 @@ def is_fisheye(where: str, table: Mapping[str, object]) -> bool:
     """
     found: dict[str, bool] = {}
     for key, value in table.items():
-        if LENS_KEYS.fullmatch(key) and (told := _lens_named(where, key, value)) is not None:
-            found[key] = told
+        if LENS_KEYS.fullmatch(key) and (fisheye := _lens_named(where, key, value)) is not None:
+            found[key] = fisheye
         elif MODEL_KEYS.fullmatch(key) and isinstance(value, str) and _plain(value) in FISHEYES:
             found[key] = True
-    flags = {key: told for key, told in found.items() if "fish" in key.lower()}
+    flags = {key: fisheye for key, fisheye in found.items() if "fish" in key.lower()}
     if False in flags.values() and True in found.values():
         raise CalibrationError(f"{where}{' and '.join(found)}: found {' and '.join(shown(table[key]) for key in found)}, expected one "
                                "model of the lens")

@@ -108,7 +108,7 @@ def _drafts(path: Path, values: dict[str, Any], alone: str) -> Drafts:
     if bare and len(lenses) > 1:
         raise CalibrationError(f"{path}: no rotation of {choices(bare)}, expected R and T (or rvec and tvec) of every camera; EasyMocap "
                                "has them in extri.yml beside intri.yml")
-    notes = [f"{path.name} tells of the lens alone: the camera is taken for level, at the world's origin"] if bare else []
+    notes = [f"{path.name} states the lens alone: the camera is taken for level, at the world's origin"] if bare else []
     named = values.get("camera_name") if len(lenses) == 1 and isinstance(values.get("camera_name"), str) else None
     drafts = tuple(_draft(path, named or end or alone, parts, fisheye) for end, parts in lenses.items())
     return Drafts(drafts, unit or (JARVIS_UNIT if jarvis else None), tuple(notes), unused)

@@ -28,7 +28,7 @@ FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
 KNOWN = (*FIELDS, "name", "fisheye", "oriented", "ignore", "port", "cam_id", "rotation_count")
 """Keys that are read."""
 IGNORED = ("backend", "error", "exposure", "grid_count", "verified_resolutions", "verbosity", "world_orientation", "world_position")
-"""Keys of other programs that say nothing of where a camera sees a point, or what its rotation and translation say already."""
+"""Keys of other programs that do not change where a camera sees a point, or repeat its rotation and translation."""
 ASIDE = ("board", "capture", "charuco", "date", "metadata", "version")
 """Sections of other programs that are no cameras."""
 BARE_KEY = r"[A-Za-z0-9_-]+"

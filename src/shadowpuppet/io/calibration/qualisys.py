@@ -7,7 +7,6 @@ Distortion is as OpenCV's. Pose2Sim (0.10) divides it by 64, too, which would le
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,16 +16,14 @@ from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import rigid
 from shadowpuppet.io.calibration._xml import Entry, entries, tree_of
 from shadowpuppet.io.calibration.draft import Draft, Drafts
-from shadowpuppet.names import composed
-from shadowpuppet.video import FILM_SUFFIXES
+from shadowpuppet.io.calibration.roles import of_films
 
 SUBPIXELS = 64
-FOR_FILMS = re.compile("video|hybrid", re.IGNORECASE)
-"""Models of cameras that make films; others do, too, if QTM is set so."""
 BACKWARD = np.diag([1.0, -1.0, -1.0])
 """From axes with y up and z backward to OpenCV's."""
-CAMERA_KEYS = ("active", "avg-residual", "calibrated", "id", "model", "name", "points-count", "serial", "video_resolution", "viewrotation")
-"""Attributes of a camera, of which `active`, `model` and `serial` are used; `viewrotation` is named where it is not zero."""
+CAMERA_KEYS = ("active", "avg-residual", "calibrated", "id", "message", "model", "name", "point-count", "points-count", "serial",
+               "video_resolution", "viewrotation")
+"""Attributes of a camera. `active`, `model` and `serial` are used; `viewrotation` is named where it is not zero."""
 PARTS = {"fov_video": ("left", "top", "right", "bottom"),
          "transform": ("x", "y", "z", *(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))),
          "intrinsic": ("focallength", "sensorMinU", "sensorMaxU", "sensorMinV", "sensorMaxV", "focalLengthU", "focalLengthV",
@@ -40,9 +37,7 @@ def read_qualisys(path: Path) -> Drafts:
     """Cameras of a .qca.txt file: those with a film beside it or in the recording around it, and those made for films by their model; all
     if there is neither. Raises `CalibrationError`."""
     cameras = [entry for entry in entries(path, tree_of(path), ".//cameras/camera", "serial") if entry.element.get("active", "1") != "0"]
-    there = _filmed(path)
-    films = [entry for entry in cameras if composed(entry.camera) in there or FOR_FILMS.search(entry.element.get("model", ""))]
-    used = films or cameras
+    used = of_films(path, cameras, "model")
     if not used:
         raise CalibrationError(f"{path}: no active camera in it, expected <cameras> with a <camera> each")
     left_out = [entry.camera for entry in cameras if entry not in used]
@@ -65,17 +60,6 @@ def _unused(entry: Entry) -> Iterator[str]:
 
 def _is_turned(entry: Entry) -> bool:
     return entry.element.get("viewrotation", "0") not in ("0", "")
-
-
-def _filmed(path: Path) -> set[str]:
-    """Names of the films, and of folders of pictures, in the recording in which a calibration lies."""
-    folder = path.parent.parent if path.parent.name.lower() == "calibration" else path.parent
-    names = set[str]()
-    for place in (folder, folder / "video", folder / "videos"):
-        inside = list(place.iterdir()) if place.is_dir() else []
-        names |= {each.stem for each in inside if each.suffix.lower() in FILM_SUFFIXES}
-        names |= {each.name for each in inside if place != folder and each.is_dir()}
-    return set(map(composed, names))
 
 
 def _draft(entry: Entry) -> Draft:

@@ -16,6 +16,7 @@ from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, rigid
 from shadowpuppet.io.calibration._xml import Entry, entries, tree_of
 from shadowpuppet.io.calibration.draft import Draft, Drafts, numbers_of
+from shadowpuppet.io.calibration.roles import of_films
 
 GRID = 33
 """Grid points along each side at which distortion is compared."""
@@ -40,9 +41,9 @@ class ViconDistortion(NamedTuple):
 
 
 def read_vicon(path: Path) -> Drafts:
-    """Cameras of an .xcp file; only the video cameras if there are any. Raises `CalibrationError`."""
+    """Cameras of an .xcp file: those that make films (`roles`). Raises `CalibrationError`."""
     cameras = list(entries(path, tree_of(path), ".//Camera", "DEVICEID"))
-    used = [entry for entry in cameras if "video" in entry.element.get("TYPE", "").lower()] or cameras
+    used = of_films(path, cameras, "TYPE")
     posed = [entry for entry in used if entry.element.find("KeyFrames/KeyFrame") is not None]
     if not posed:
         raise CalibrationError(f"{path}: no calibrated camera in it, expected <Camera> with <KeyFrames><KeyFrame> in it")

@@ -20,7 +20,7 @@ class Lock(NamedTuple):
 
     folder: Path
     what: str
-    """What the process does in the folder, such as `run`."""
+    """Purpose of the lock, such as `run`."""
     file: BinaryIO
     """The open lock file. As long as it is open, no other file gets its number on the disk."""
     place: os.stat_result

@@ -23,8 +23,8 @@ BROKEN = (EOFError, ValueError, TypeError, KeyError, AttributeError, OverflowErr
           tokenize.TokenError, struct.error, zlib.error, lzma.LZMAError, zipfile.BadZipFile)  # fmt: skip
 """Exceptions, other than `OSError`, that NumPy raises for a file that is damaged, encrypted or no archive."""
 UNPACKED, RATIO = FILE_MEMORY // 4, 10
-"""Greatest size of the arrays of a packed file: bytes, of which reading holds up to four copies, or over its own size if that is more. No
-long motion can be packed more tightly."""
+"""Greatest size of the arrays of a packed file: bytes (reading holds up to four copies), or over its own size if that is more. No long
+motion can be packed more tightly."""
 HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
 

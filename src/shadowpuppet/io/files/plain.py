@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
@@ -44,3 +45,8 @@ def for_json(value: Any) -> Any:
     if isinstance(value, list):
         return [for_json(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def json_text(value: Any, where: str = "value") -> str:
+    """Plain values, arrays and dataclasses as JSON; null for numbers that are not finite. Raises `ShadowPuppetError` as `plain` does."""
+    return json.dumps(for_json(plain(value, where)), indent=1, ensure_ascii=False, allow_nan=False)

@@ -42,7 +42,7 @@ class Table:
     columns: tuple[str, ...]
     text: str
     begins: NDArray[np.int64]
-    """Where each row begins in the text, of shape (T,)."""
+    """Begin of each row in the text, of shape (T,)."""
     lines: NDArray[np.int64]
     """Line number in the file of each row, of shape (T,)."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
@@ -75,9 +75,12 @@ class Resuming(NamedTuple):
 NO_INPUTS = Inputs({}, {})
 
 
-def inputs_of(recording: str | Path, settings: Mapping[str, Path | None]) -> Inputs:
-    """The files that a run of a recording depends on, as they are now. `settings`: files that settings name, by the setting's name."""
-    parts = parts_of(Path(str(recording))) | {f"--{name}": Path(path) for name, path in settings.items() if path is not None}
+def inputs_of(recording: str | Path | Sequence[Path], settings: Mapping[str, Path | None]) -> Inputs:
+    """The files that a run of a recording, or of films, depends on, as they are now. `settings`: files that settings name, by the setting's
+    name."""
+    sources = [Path(recording)] if isinstance(recording, str | Path) else recording
+    parts = parts_of(sources[0]) if len(sources) == 1 else {str(source): source for source in sources}
+    parts |= {f"--{name}": Path(path) for name, path in settings.items() if path is not None}
     return Inputs(parts, {name: state_of(path) for name, path in parts.items()})
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import count, islice
 from pathlib import Path
@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.errors import SilhouetteError
+from shadowpuppet.errors import SilhouetteError, choices
 from shadowpuppet.silhouette.external.ready_mask import THRESHOLD
-from shadowpuppet.video import IMAGE_SUFFIXES, Image, open_frames
+from shadowpuppet.video import IMAGE_SUFFIXES, Image, open_frames, open_untimed
 from shadowpuppet.video.frames import ASSUMED_RATE, Frame, FrameSource, Wanted, check_size
 from shadowpuppet.video.images import Layers, in_folder, is_coloured, read_layers
 
 LOOKED_AT = 12
-"""Number of masks, spread over the film, that tell of which kind all are."""
+"""Number of masks, spread over the film, by which the kind of all is known."""
 AROUND = 0.75
 """Share of the picture's border that the background fills at least, in half of the masks."""
 SOME = 0.001
@@ -33,7 +33,7 @@ class MaskKind:
     """How the masks of one camera are written."""
 
     layer: Literal["grey", "alpha", "labels"] = "grey"
-    """Where the person is told."""
+    """Part of the pictures that shows the person."""
     person: int = 1
     """The person's label."""
     inverted: bool = False
@@ -52,7 +52,7 @@ class MaskKind:
 def mask_kind(source: Path, label: int | None = None) -> MaskKind:
     """The kind of the masks in a film, picture or folder of pictures; `label`: the person's, where masks are labels.
 
-    Raises `SilhouetteError` for several labels of which none is chosen, and for a label of masks that are a film; `VideoError`.
+    Raises `SilhouetteError` for several labels without a choice, for a label that no mask has, and for a label of a film; `VideoError`.
     """
     if not are_pictures(source):
         if label is not None:
@@ -65,7 +65,7 @@ def mask_kind(source: Path, label: int | None = None) -> MaskKind:
     if label is None and alphas and min(alpha.min() for alpha in alphas) < max(alpha.max() for alpha in alphas):
         return MaskKind("alpha")
     if label is not None or _are_labels(layers):
-        return _label_kind(source, [_numbers(each, source) for each in layers], label)
+        return _label_kind(source, paths, [_numbers(each, source) for each in layers], label)
     return MaskKind(inverted=_surrounds([_grey(each.image) >= THRESHOLD for each in layers]))
 
 
@@ -75,7 +75,7 @@ def open_masks(source: Path, kind: MaskKind) -> FrameSource:
     if not are_pictures(source):
         film = open_frames(source)
         return replace(film, read=lambda wanted: _changed(film.read(wanted), np.invert)) if kind.inverted else film
-    frames, paths = open_frames(source, rate=ASSUMED_RATE), _paths(source)
+    frames, paths = open_untimed(source), _paths(source)
 
     def read(wanted: Wanted) -> Iterator[Frame]:
         for n, path in enumerate(paths):
@@ -136,25 +136,35 @@ def _are_labels(layers: list[Layers]) -> bool:
     return 0 < greatest < (DEEP if deep else DARK)
 
 
-def _label_kind(source: Path, pictures: list[NDArray[np.uint16]], label: int | None) -> MaskKind:
-    found = np.unique(np.concatenate([np.unique(each) for each in pictures])).tolist()
+def _label_kind(source: Path, paths: list[Path], pictures: list[NDArray[np.uint16]], label: int | None) -> MaskKind:
+    """The kind of label images; `pictures`: some of those at `paths`, in which a label may be missing."""
+    found = _values(pictures)
     around = next((each for each in found if _surrounds([picture == each for picture in pictures])), 0)
     others = [each for each in found if each != around]
     if label is None and len(others) > 1:
         parts = ", ".join(f"{each} ({100 * np.mean([np.mean(picture == each) for picture in pictures]):.2g} %)" for each in others[:MOST])
         raise SilhouetteError(f"{source}: found masks with the labels {parts} of the picture, expected one, the person's: choose it with "
                               "--label N")
+    if label is not None and label not in others:
+        others = [each for each in _values(_numbers(read_layers(path), path) for path in paths) if each != around]
+        if label not in others:
+            raise SilhouetteError(f"{source}: label: found {label}, which is {'the background' if label == around else 'in no mask'}, "
+                                  f"expected {choices(map(str, others[:MOST])) or 'masks of a person'}")
     return MaskKind("labels", label if label is not None else others[0] if others else around + 1)
 
 
+def _values(pictures: Iterable[NDArray[np.uint16]]) -> list[int]:
+    return sorted(set[int]().union(*(np.unique(each).tolist() for each in pictures)))
+
+
 def _surrounds(masks: list[Mask]) -> bool:
-    """Whether what masks (H, W) hold is the background: it fills the border, and not the whole picture."""
+    """Whether masks (H, W) show the background: they fill the border, and not the whole picture."""
     borders = [np.concatenate([mask[0], mask[-1], mask[1:-1, 0], mask[1:-1, -1]]).mean() for mask in masks]
     return bool(borders) and float(np.median(borders)) >= AROUND and min(float(mask.mean()) for mask in masks) < 1 - SOME
 
 
 def _film_is_inverted(source: Path) -> bool:
-    """Whether a film's masks are black on white: the first ones tell, unless their border is white."""
+    """Whether a film's masks are black on white: by the first ones, or by all if the border of these is white."""
     film = open_frames(source, grey=True)
 
     def bright(frame: Frame) -> Mask:

@@ -16,7 +16,7 @@ from shadowpuppet.errors import FormatError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.table import shorten, with_point
 from shadowpuppet.io.files.text import read_text
-from shadowpuppet.io.motion.asf import Skeleton, euler, read_asf
+from shadowpuppet.io.motion.asf import AcclaimSkeleton, euler, read_asf
 from shadowpuppet.motion.motion import JointTable
 
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
@@ -39,7 +39,7 @@ the hips, `face` in front of the crown."""
 class Capture:
     """Motion of a skeleton."""
 
-    skeleton: Skeleton
+    skeleton: AcclaimSkeleton
     root: Array
     """Position of the root (T, 3), metres, in the file's world."""
     root_rotation: Array
@@ -84,7 +84,7 @@ class Capture:
         return Capture(self.skeleton, np.zeros((1, 3)), np.eye(3)[None], zero)
 
 
-def read_amc(path: str | Path, skeleton: Skeleton) -> Capture:
+def read_amc(path: str | Path, skeleton: AcclaimSkeleton) -> Capture:
     """Read an AMC file. Raises `FormatError`, naming the line, if it is malformed or of another skeleton."""
     path = Path(path)
     lines = read_text(path).splitlines()
@@ -136,7 +136,7 @@ def _beside(path: Path) -> Path:
     raise FormatError(f"{path}: found {len(there)} .asf files beside it, expected {' or '.join(f'{s}.asf' for s in stems)}")
 
 
-def _header(path: Path, lines: list[str], skeleton: Skeleton) -> tuple[int, bool]:
+def _header(path: Path, lines: list[str], skeleton: AcclaimSkeleton) -> tuple[int, bool]:
     """Index of the first frame's line, and whether angles are degrees."""
     degrees = skeleton.degrees
     for n, line in enumerate(lines):
@@ -150,7 +150,7 @@ def _header(path: Path, lines: list[str], skeleton: Skeleton) -> tuple[int, bool
     raise FormatError(f"{path}: found no frames, expected lines with a number before each")
 
 
-def _layout(path: Path, lines: list[str], first: int, skeleton: Skeleton) -> tuple[list[str], list[int]]:
+def _layout(path: Path, lines: list[str], first: int, skeleton: AcclaimSkeleton) -> tuple[list[str], list[int]]:
     """Names in the first frame's lines, and the number of values of each."""
     wanted = {"root": 6} | {bone.name: len(bone.dofs) for bone in skeleton.bones}
     names: list[str] = []

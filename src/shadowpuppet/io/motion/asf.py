@@ -42,7 +42,7 @@ class Bone:
 
 
 @dataclass(frozen=True)
-class Skeleton:
+class AcclaimSkeleton:
     """Bones, parents before children; the root has six degrees of freedom."""
 
     path: Path
@@ -64,7 +64,7 @@ class Skeleton:
         raise FormatError(f"{self.path}: no bone {name!r}; there are: {choices(bone.name for bone in self.bones)}")
 
 
-def read_asf(path: str | Path) -> Skeleton:
+def read_asf(path: str | Path) -> AcclaimSkeleton:
     """Read an ASF file. Lengths are in units of 1/length inches, as the CMU graphics lab's.
 
     Raises `FormatError`, naming line and key, if the file is malformed.
@@ -83,7 +83,7 @@ def read_asf(path: str | Path) -> Skeleton:
     root = {words[0].lower(): (line, words[1:]) for line, words in sections["root"]}
     order = _root_dofs(path, *root.get("order", (0, list(ROOT))))
     axis = _order(path, *root.get("axis", (0, ["XYZ"])))
-    return Skeleton(path, _ordered(path, bones, sections["hierarchy"]), order, axis, unit, degrees)
+    return AcclaimSkeleton(path, _ordered(path, bones, sections["hierarchy"]), order, axis, unit, degrees)
 
 
 def euler(order: str, angles: Array) -> Array:

@@ -131,13 +131,13 @@ def _header(path: Path, size: int, head: bytes, parameters: dict[str, Any], proc
     block = struct.unpack(f"{order}H", head[16:18])[0]
     known = C3d(path, parameters, points, analog, 0, 1, 0, 0.0, 0.0, processor)
 
-    def told(name: str, otherwise: float) -> float:
+    def value_of(name: str, otherwise: float) -> float:
         values = known.numbers(name)
         return float(values[0]) if len(values) else otherwise
 
-    points, block = (int(told(name, value)) & 0xFFFF or value for name, value in (("POINT:USED", points), ("POINT:DATA_START", block)))
-    scale = told("POINT:SCALE", _float(head[12:16], processor))
-    rate = told("POINT:RATE", _float(head[20:24], processor))
+    points, block = (int(value_of(name, value)) & 0xFFFF or value for name, value in (("POINT:USED", points), ("POINT:DATA_START", block)))
+    scale = value_of("POINT:SCALE", _float(head[12:16], processor))
+    rate = value_of("POINT:RATE", _float(head[20:24], processor))
     if not (math.isfinite(scale) and scale != 0) or not 0 < rate < 1e6 or not points or not block:
         raise FormatError(f"{path}: found {points} points at {rate:g} frames/s, scale {scale:g}, data from block {block}, expected some, "
                           "each more than zero (the scale less where they are floats)")

@@ -29,7 +29,7 @@ MAX_RESIDUAL = 255
 UNKNOWN_RESIDUAL = -1.0
 """Marks an unknown position."""
 EVENTS = {True: "Foot Strike", False: "Foot Off"}
-"""What happens to a foot, in the words of Vicon's programs."""
+"""Events of a foot, in the words of Vicon's programs."""
 Parameter = tuple[str, int, Sequence[int], bytes]
 """Name, kind, shape and value."""
 Angles = Mapping[str, tuple[str, Array]]

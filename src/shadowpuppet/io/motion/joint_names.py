@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shadowpuppet.body.bones import BONES
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.errors import FormatError
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import read_toml

@@ -1,4 +1,4 @@
-"""What a motion file holds, for `info`."""
+"""Content of a motion file, for `info`."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class MotionLook:
     channels: tuple[str, ...]
     """Names of analog channels, which are not read."""
     notes: tuple[str, ...]
-    """How unit, axes and frames were understood, a sentence each."""
+    """Assumptions about unit, axes and frames, a sentence each."""
 
 
 @np.errstate(all="ignore")  # impossible numbers, as in `read_motion`

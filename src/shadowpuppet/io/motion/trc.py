@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from shadowpuppet.errors import FormatError, ShadowPuppetError, choices, warn
 from shadowpuppet.io.files.table import cells, check_times, number, shorten
 from shadowpuppet.io.files.text import errors_named, read_text, write_whole
-from shadowpuppet.motion.interpolation import rate_of
+from shadowpuppet.motion.interpolation import filled, rate_of
 from shadowpuppet.motion.motion import JointTable
 
 METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 """Units of length in metres."""
 MISSING = ("nan", "drop", "fill")
-"""What is written for unknown positions: the text NaN; no frame that has one; interpolated positions."""
+"""Ways to write unknown positions: the text NaN; no frame that has one; interpolated positions."""
 KEYS = ("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame", "OrigNumFrames")
 
 
@@ -64,7 +64,8 @@ def write_trc(path: str | Path, table: JointTable, unit: str = "mm", missing: st
     bad = [name for name in table.names if "\t" in name or name.splitlines() != [name]]
     if bad:
         raise ShadowPuppetError(f"{path}: marker name: found {bad[0]!r}, expected one without tabs and line ends")
-    rate, table = _rate(table), _without_gaps(path, table, missing)
+    rate = f"{rate_of(table.times) if len(table.times) > 1 else 1.0:.6g}"
+    table = _without_gaps(path, table, missing)
     count = len(table.times)
     values = (rate, rate, count, len(table.names), unit, rate, 1, count)
     axes = [f"{axis}{n}" for n in range(1, len(table.names) + 1) for axis in "XYZ"]
@@ -93,11 +94,7 @@ def _without_gaps(path: Path, table: JointTable, missing: str) -> JointTable:
                                 "nan and fill write other frames")
     if missing == "drop":
         return JointTable(kept.times[whole], kept.names, kept.positions[whole])
-    places = kept.positions.copy()
-    for n in range(len(seen)):
-        for axis in range(3):
-            places[:, n, axis] = np.interp(kept.times, kept.times[known[:, n]], places[known[:, n], n, axis])
-    return JointTable(kept.times, kept.names, places)
+    return JointTable(kept.times, kept.names, filled(kept.times, np.where(known[:, :, None], kept.positions, np.nan)))
 
 
 def _markers(path: Path, header: dict[str, str], line: list[str]) -> tuple[str, ...]:
@@ -136,7 +133,3 @@ def _check_count(path: Path, header: dict[str, str], count: int) -> None:
     said = header.get("NumFrames", "")
     if said != str(count):
         warn(f"{path}: line 3, NumFrames: found {said!r}, but the file has {count} frames; those are used")
-
-
-def _rate(table: JointTable) -> str:
-    return f"{rate_of(table.times) if len(table.times) > 1 else 1.0:.6g}"

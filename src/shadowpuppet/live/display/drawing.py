@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shadowpuppet.camera.drawing import SILHOUETTE_ONLY, draw_skeleton
-from shadowpuppet.live.display.view import View
+from shadowpuppet.live.display.view import SessionState
 
 if TYPE_CHECKING:
     from shadowpuppet.camera.rasterize import Picture
@@ -23,7 +23,7 @@ DIM, TINT = 0.45, 0.15
 """Brightness of a picture without tracking, and opacity of the body's colour."""
 
 
-def drawn(view: View) -> Image | None:
+def drawn(view: SessionState) -> Image | None:
     """The view's picture (H, W, 3), blue green red, with outline, body and skeleton drawn if known; None without a picture."""
     import cv2
 
@@ -54,7 +54,7 @@ def _shown_size(size: Size) -> Size:
     return round(size[0] * scale), round(size[1] * scale)
 
 
-def _draw_body(out: Image, view: View) -> None:
+def _draw_body(out: Image, view: SessionState) -> None:
     assert view.picture is not None
     assert view.pose is not None
     picture = _scaled(view.picture, (out.shape[1], out.shape[0]))

@@ -1,4 +1,4 @@
-"""State of a live session after a picture, and the base class of displays."""
+"""Output of a live session: its state after a picture, the base class of displays, the display of `--show`, and messages."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
+from shadowpuppet.errors import SettingsError, warn
+from shadowpuppet.pipeline.progress import Listener
+
 if TYPE_CHECKING:  # these import Numba
     from numpy.typing import NDArray
 
     from shadowpuppet.camera.rasterize import Picture
+    from shadowpuppet.live.display.web import WebDisplay
     from shadowpuppet.video import Image
 
 PHASES = ("learning", "waiting", "measuring", "tracking")
@@ -19,7 +23,7 @@ COMMANDS = ("stop", "learn", "measure")
 """Commands to a session: end, learn the background again, find the person again."""
 
 
-class Angle(NamedTuple):
+class DofAngle(NamedTuple):
     """A joint angle and its limits, degrees."""
 
     name: str
@@ -30,7 +34,7 @@ class Angle(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class View:
+class SessionState:
     """State of a session after a picture."""
 
     phase: str
@@ -45,7 +49,7 @@ class View:
     """One of `motion.STATUSES` while tracking, else empty."""
     overlap: float = np.nan
     """Overlap of body and silhouette, 0..1."""
-    angles: tuple[Angle, ...] = ()
+    angles: tuple[DofAngle, ...] = ()
     latency: float = np.nan
     """Seconds from capture to pose; with a lag, to the smoothed one."""
     lag: float = 0.0
@@ -76,10 +80,10 @@ class View:
 
     def figures(self) -> dict[str, Any]:
         """Everything but the arrays, for JSON: milliseconds and degrees, None if unknown."""
-        return {"phase": self.phase, "chip": self.chip, "message": self.trouble or self.message, "countdown": _number(self.countdown, 1),
-                "overlap": _number(self.overlap, 3), "latency": _number(1000 * self.latency, 1), "lag": _number(1000 * self.lag, 0),
-                "interval": _number(1000 * self.interval, 1), "rate": _number(self.rate, 1), "dropped": self.dropped,
-                "angles": [[a.name, _number(a.value, 1), a.low, a.high] for a in self.angles]}
+        return {"phase": self.phase, "chip": self.chip, "message": self.trouble or self.message, "countdown": rounded(self.countdown, 1),
+                "overlap": rounded(self.overlap, 3), "latency": rounded(1000 * self.latency, 1), "lag": rounded(1000 * self.lag, 0),
+                "interval": rounded(1000 * self.interval, 1), "rate": rounded(self.rate, 1), "dropped": self.dropped,
+                "angles": [[a.name, rounded(a.value, 1), a.low, a.high] for a in self.angles]}
 
 
 class Display:
@@ -95,7 +99,7 @@ class Display:
     def __exit__(self, *_: object) -> None:
         """Close it."""
 
-    def show(self, view: View) -> None:
+    def show(self, view: SessionState) -> None:
         """Show a view; called at least ten times a second, changed or not."""
 
     def command(self) -> str:
@@ -103,5 +107,46 @@ class Display:
         return ""
 
 
-def _number(value: float | None, digits: int) -> float | None:
+def rounded(value: float | None, digits: int) -> float | None:
+    """A number for JSON; None if it is not known."""
     return None if value is None or not np.isfinite(value) else round(float(value), digits)
+
+
+class LiveListener(Listener):
+    """Receives messages of a session. Every method does nothing: override those of interest."""
+
+    def note(self, message: str) -> None:
+        """A message for the person before the camera or at the terminal."""
+
+    def trouble(self, message: str) -> None:
+        """A problem: no usable pictures come, or the motion cannot be sent to other programs."""
+
+
+FOOTERS = {
+    False: "Pictures stay in this machine's memory; joints and angles alone are saved.",
+    True: "The pictures are recorded (--record).",
+}
+GONE = {
+    "window": "--show browser shows the same on a page, with the same keys",
+    "viewer": "--show browser shows the body in space too, beside the picture",
+}
+"""Displays that are gone, and what replaces them."""
+
+
+def open_display(show: str, listen: str = "127.0.0.1", port: int | None = None, record: bool = False,
+                 page: type[WebDisplay] | None = None) -> Display:
+    """The display for `auto`, `browser` or `none`; `auto` also opens the page in a browser if there is a screen.
+
+    `page`: the kind of page; None: the plain one. Raises `SettingsError` if it cannot be served.
+    """
+    if show == "none":
+        return Display()
+    if show in GONE:
+        raise SettingsError(f"show: found {show!r}, which is gone: {GONE[show]}")
+    from shadowpuppet.live.display.web import WebDisplay
+    from shadowpuppet.network import is_loopback
+
+    display = (page or WebDisplay)(listen, port, FOOTERS[record], opening=show == "auto")
+    if not is_loopback(listen):
+        warn(f"the page is served at {listen}: everybody who reaches this machine can see the person there, and press the buttons")
+    return display

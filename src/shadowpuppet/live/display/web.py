@@ -11,7 +11,7 @@ from typing import Any, Self
 from urllib.parse import urlsplit
 
 from shadowpuppet.live.display.drawing import drawn, jpeg
-from shadowpuppet.live.display.view import COMMANDS, Display, View
+from shadowpuppet.live.display.view import COMMANDS, Display, SessionState
 from shadowpuppet.network import open_browser, open_page, page_headers, shown_host
 from shadowpuppet.page_server import PageHandler, PageServer
 
@@ -39,11 +39,11 @@ class WebDisplay(Display):
         """
         self.footer, self.opening = footer, opening
         self.closed = False
-        self._view = View(phase="learning", message="getting ready")
+        self._view = SessionState(phase="learning", message="getting ready")
         self._number, self._command = 0, ""
         self._drawn: tuple[int, bytes] = (-1, b"")
         self._changed, self._drawing = threading.Condition(), threading.Lock()
-        self.server = open_page(lambda tried: _Server(self, listen, tried), listen, port, PORT)
+        self.server = open_page(lambda tried: _DisplayServer(self, listen, tried), listen, port, PORT)
         self.address = f"http://{shown_host(listen)}:{self.server.server_port}/"
         self.where = f"at {self.address}"
 
@@ -55,14 +55,14 @@ class WebDisplay(Display):
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Tell open pages that the session is over, and close."""
+        """Send open pages the end of the session, and close."""
         with self._changed:
             self.closed = True
             self._changed.notify_all()
         self.server.shutdown()
         self.server.server_close()
 
-    def show(self, view: View) -> None:
+    def show(self, view: SessionState) -> None:
         """Set the newest view; pages skip views that they did not fetch in time."""
         with self._changed:
             if view.image is None and view.chip == self._view.chip:  # nothing new: pages keep the last picture
@@ -79,22 +79,22 @@ class WebDisplay(Display):
         """Store the command of a button or key."""
         self._command = command
 
-    def next(self, after: int, timeout: float = 1.0) -> tuple[int, View]:
+    def next(self, after: int, timeout: float = 1.0) -> tuple[int, SessionState]:
         """The newest view and its number; waits up to `timeout` seconds for one newer than number `after`."""
         with self._changed:
             if self._number <= after and not self.closed:
                 self._changed.wait(timeout)
             return self._number, self._view
 
-    def figures(self, view: View) -> dict[str, Any]:
-        """What the page is sent of a view, for JSON."""
+    def figures(self, view: SessionState) -> dict[str, Any]:
+        """A view's figures for the page, as JSON."""
         return view.figures() | {"footer": self.footer}
 
     def part(self, path: str) -> tuple[bytes, str] | None:
-        """What a subclass serves beside the page, at a path, and its content type; None if there is nothing."""
+        """Content of a further path and its type, for subclasses; None if there is nothing."""
         return None
 
-    def picture(self, number: int, view: View) -> bytes:
+    def picture(self, number: int, view: SessionState) -> bytes:
         """A view's picture as JPEG, drawn once for all connections; empty without a picture."""
         with self._drawing:
             if self._drawn[0] != number:
@@ -103,14 +103,14 @@ class WebDisplay(Display):
             return self._drawn[1]
 
 
-class _Server(PageServer):
+class _DisplayServer(PageServer):
     def __init__(self, display: WebDisplay, listen: str, port: int) -> None:
         self.display = display
-        super().__init__(_Handler, listen, port)
+        super().__init__(_DisplayHandler, listen, port)
 
 
-class _Handler(PageHandler):
-    server: _Server  # pyright: ignore[reportIncompatibleVariableOverride]
+class _DisplayHandler(PageHandler):
+    server: _DisplayServer  # pyright: ignore[reportIncompatibleVariableOverride]
     page_headers = HEADERS
 
     def do_GET(self) -> None:
@@ -161,11 +161,11 @@ class _Handler(PageHandler):
         if part == self._figures:
             self.send(b'data: {"over": true}\n\n')
 
-    def _picture(self, number: int, view: View) -> bytes:
+    def _picture(self, number: int, view: SessionState) -> bytes:
         """One part and the boundary after it, at which browsers show the picture."""
         data = self.server.display.picture(number, view)
         head = f"Content-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
         return head.encode() + data + f"\r\n--{BOUNDARY}\r\n".encode() if data else b""
 
-    def _figures(self, number: int, view: View) -> bytes:
+    def _figures(self, number: int, view: SessionState) -> bytes:
         return f"data: {json.dumps(self.server.display.figures(view), allow_nan=False)}\n\n".encode()

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shadowpuppet.geometry import Array, inverse, rotation_about
-from shadowpuppet.live.stream.outlet import StreamFrame, Subject
+from shadowpuppet.live.stream.outlet import StreamFrame, StreamSubject
 
 TO_UNITY = np.array([[0.0, -1, 0], [0, 0, 1.0], [1.0, 0, 0]])
 """From axes forward, left, up to Unity's right, up, forward: a reflection, as handedness changes."""
@@ -49,7 +49,7 @@ LINKS = _links()
 """Bones of all our bodies, parents before children."""
 
 
-class Bone(NamedTuple):
+class VmcBone(NamedTuple):
     """A bone relative to its parent, in Unity's frame."""
 
     name: str
@@ -62,7 +62,7 @@ class Bone(NamedTuple):
 class Avatar:
     """The bones of `LINKS` that a subject's body has. If a bone's parent is missing, its parent is the hips."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: StreamSubject) -> None:
         """Place the avatar: the floor is Y = 0; in the zero pose it stands upright at the origin, looking along Z."""
         self.links = [link for link in LINKS if link.joint in subject.names]
         self._nodes = [subject.names.index(link.joint) for link in self.links]
@@ -75,7 +75,7 @@ class Avatar:
         rise = subject.pelvis_height if subject.floor is None else -subject.floor
         self._shift = np.array([0.0, rise, 0.0]) - self._to_unity @ base[:3, 3]
 
-    def bones(self, frame: StreamFrame) -> list[Bone]:
+    def bones(self, frame: StreamFrame) -> list[VmcBone]:
         """All bones, parents before children; none if the frame has no pose."""
         if frame.positions is None or frame.rotations is None:
             return []
@@ -89,7 +89,7 @@ class Avatar:
         start = np.where(is_root[:, None], 0.0, positions[self._parents])
         local = (to_parent @ (positions - start)[:, :, None])[..., 0].tolist()
         quaternions = Rotation.from_matrix(to_parent @ rotations).as_quat(canonical=True).tolist()
-        return [Bone(link.name, tuple(position), tuple(rotation)) for link, position, rotation in zip(self.links, local, quaternions)]
+        return [VmcBone(link.name, tuple(position), tuple(rotation)) for link, position, rotation in zip(self.links, local, quaternions)]
 
 
 def _twist(elbow: Array) -> Array:

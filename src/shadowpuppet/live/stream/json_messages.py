@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.live.stream.outlet import StreamFrame, Subject
+from shadowpuppet.live.display.view import rounded
+from shadowpuppet.live.stream.outlet import StreamFrame, StreamSubject
 
 VERSION = 1
 """Version of the messages; raised by changes that break programs which read them."""
@@ -16,10 +17,10 @@ FRAME = "right-handed, Z up: the calibration's world, or of a camera that has no
 ROTATIONS = "quaternions x, y, z, w, from the axes of who stands at zero with hanging arms (X forward, Y left, Z up) to the world"
 
 
-def beginning(subject: Subject) -> str:
+def beginning(subject: StreamSubject) -> str:
     """The first message: the person, and what the lists in frames mean."""
     return _text({
-        "type": "begin", "format": "shadowpuppet", "version": VERSION, "body": subject.body.name, "height": _number(subject.height, 4),
+        "type": "begin", "format": "shadowpuppet", "version": VERSION, "body": subject.body.name, "height": rounded(subject.height, 4),
         "joints": subject.names, "parents": subject.parents, "angles": subject.body.skeleton.dof_names,
         "units": {"time": "s", "length": "m", "angle": "rad"}, "frame": FRAME, "rotations": ROTATIONS,
     })  # fmt: skip
@@ -29,18 +30,14 @@ def framed(frame: StreamFrame) -> str:
     """The message of one frame; unknown values are null."""
     rotations = None if frame.rotations is None else Rotation.from_matrix(frame.rotations).as_quat(canonical=True)
     return _text({
-        "type": "frame", "time": _number(frame.time, 6), "status": frame.status, "overlap": _number(frame.overlap, 4),
-        "age": _number(frame.age, 4), "joints": _numbers(frame.positions, 5), "rotations": _numbers(rotations, 6),
+        "type": "frame", "time": rounded(frame.time, 6), "status": frame.status, "overlap": rounded(frame.overlap, 4),
+        "age": rounded(frame.age, 4), "joints": _numbers(frame.positions, 5), "rotations": _numbers(rotations, 6),
         "angles": _numbers(frame.pose, 5), "statuses": frame.statuses,
     })  # fmt: skip
 
 
 def _text(value: object) -> str:
     return json.dumps(value, allow_nan=False, separators=(",", ":"))
-
-
-def _number(value: float | None, digits: int) -> float | None:
-    return None if value is None or not np.isfinite(value) else round(float(value), digits)
 
 
 def _numbers(values: Array | None, digits: int) -> object:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shadowpuppet.errors import SettingsError, extra_command
-from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, Subject
+from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, StreamSubject
 
 CONFIG = "[multicast]\nResolveScope = {scope}\n{listen}[log]\nlevel = -3\n"
 """Configuration of liblsl: scope of the stream's announcement; no log."""
@@ -51,7 +51,7 @@ class LslOutlet(Outlet):
         """End the stream."""
         self._outlet = None
 
-    def begin(self, subject: Subject) -> None:
+    def begin(self, subject: StreamSubject) -> None:
         """Announce the stream; again only if the joints differ."""
         if self._outlet is not None and self._channels == len(subject.names) * len(KINDS):
             return

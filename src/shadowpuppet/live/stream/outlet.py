@@ -42,7 +42,7 @@ class StreamFrame(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Subject:
+class StreamSubject:
     """The tracked person's body, and the body's frame in the world."""
 
     body: Body
@@ -113,7 +113,7 @@ class Outlet:
     def __exit__(self, *_: object) -> None:
         """Close it."""
 
-    def begin(self, subject: Subject) -> None:
+    def begin(self, subject: StreamSubject) -> None:
         """Start with a newly measured person; the next frames are theirs."""
 
     def send(self, frame: StreamFrame) -> None:
@@ -136,7 +136,7 @@ class Outlets(Outlet):
         self._all = self._working = list(outlets)
         self._problems = list[str]()
         self._open = ExitStack()
-        self._subject: Subject | None = None
+        self._subject: StreamSubject | None = None
 
     @property
     def where(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -155,7 +155,7 @@ class Outlets(Outlet):
         """Close all outlets."""
         self._open.__exit__(*error)
 
-    def begin(self, subject: Subject) -> None:
+    def begin(self, subject: StreamSubject) -> None:
         """Start all outlets with a newly measured person."""
         self._subject = subject
         self._each(lambda outlet: outlet.begin(subject))

@@ -14,7 +14,7 @@ from pythonosc.udp_client import UDPClient
 
 from shadowpuppet.errors import SettingsError, reason
 from shadowpuppet.live.stream.avatar import Avatar
-from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, Subject
+from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, StreamSubject
 from shadowpuppet.network import is_loopback, shown_host
 
 LOADED, CALIBRATED, NORMAL = 1, 3, 0
@@ -77,7 +77,7 @@ class VmcOutlet(Outlet):
         """Close the socket."""
         self._client.close()
 
-    def begin(self, subject: Subject) -> None:
+    def begin(self, subject: StreamSubject) -> None:
         """Build an avatar of the person's own sizes."""
         self._avatar = Avatar(subject)
 

@@ -11,10 +11,8 @@ from typing import TYPE_CHECKING, Self
 
 from shadowpuppet.errors import SettingsError, extra_command, reason
 from shadowpuppet.live.stream.json_messages import beginning, framed
-from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, Subject
+from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, StreamSubject
 from shadowpuppet.network import (
-    MAX_CONNECTIONS,
-    MAX_OF_ADDRESS,
     REQUEST_SECONDS,
     SEND_SECONDS,
     Connections,
@@ -57,7 +55,7 @@ class WebSocketOutlet(Outlet):
         self._first_message, self._subject_number = "", 0
         self._frame: StreamFrame | None = None
         self._frame_text, self._frame_number = "", 0
-        self._clients, self.served, self.refused = Connections(MAX_CONNECTIONS, MAX_OF_ADDRESS), 0, 0
+        self._clients, self.served, self.refused = Connections(), 0, 0
         self._changed, self._over = asyncio.Event(), asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._thread = threading.Thread(target=self._run, name="websocket", daemon=True)
@@ -75,7 +73,7 @@ class WebSocketOutlet(Outlet):
             self._thread.join(2 * CLOSE_SECONDS)
         self._socket.close()
 
-    def begin(self, subject: Subject) -> None:
+    def begin(self, subject: StreamSubject) -> None:
         """Send the first message to all clients, present and future."""
         text = beginning(subject)
         self._call(lambda: self._put(text, None))

@@ -20,7 +20,7 @@ from shadowpuppet.motion.interpolation import filled
 SAME_PLACE, SAME_TIME = 0.1, 0.3
 """Two contacts of a foot that lie nearer than that (m) and less than that apart (s) are one stance."""
 WALKS = 0.45
-"""Share of a foot's time on the floor above which people walk; those who run stand less, and their ankles do not tell."""
+"""Share of a foot's time on the floor above which people walk; running feet stand less, and their ankles do not show it."""
 NEAR = 0.2
 """Greatest time (s) between an end of contact and that which the ankle tells."""
 MOVES = 0.2

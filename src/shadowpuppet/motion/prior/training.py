@@ -23,7 +23,7 @@ from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import PriorFit, RegionChoice, choose_regions, fit_prior
 
 RATE = 60.0
-"""Default frame rate of a prior, frames/s: that of HumanEva."""
+"""Default frame rate of a prior, frames/s: HumanEva's."""
 DOUBTFUL_RESIDUAL, WRONG_RESIDUAL = 0.03, 0.1
 """Residuals of the joints, metres, from which a motion gives a warning, and an error: no person, or joints with other definitions."""
 MIN_MOTION = np.radians(0.5)

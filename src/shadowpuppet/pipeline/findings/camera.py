@@ -47,7 +47,7 @@ def survey_camera(rig: Rig, options: Options, listener: Listener | None = None, 
     films = films or survey_films(rig, options, steps)
     (film,) = films
     steps("silhouettes of the first seconds")
-    look = _look(footage, film, options.tracker.body in WHOLE)
+    look = _look(footage, film, options)
     hopeless = look.refusal is not None and not options.anyway
     clean = film.silhouettes if hopeless else clean_silhouettes(footage, film.sample, film.silhouettes, options)
     first = FirstSeconds([], []) if hopeless else _first_people(film.sample, clean)
@@ -66,8 +66,8 @@ def _first_people(sample: Sample, clean: Silhouettes) -> FirstSeconds:
     return FirstSeconds([time for time, _ in people], [(mask,) for _, mask in people], tuple((mask,) for _, mask in spread))
 
 
-def _look(footage: Footage, film: FilmSurvey, whole: bool) -> Look:
-    """The findings about a film in which a `whole` body, or an upper body, is to be tracked."""
+def _look(footage: Footage, film: FilmSurvey, options: Options) -> Look:
+    """The findings about a film."""
     sample, camera = film.sample, footage.camera
     plain = [mask for frame in sample.frames if (mask := film.silhouettes.plain(frame)) is not None]
     look = Look(
@@ -78,19 +78,20 @@ def _look(footage: Footage, film: FilmSurvey, whole: bool) -> Look:
     )  # fmt: skip
     if look.refusal:
         return look
-    posture = (feet_cautions({camera.name: look.quality.border["bottom"]}) if whole
+    posture = (feet_cautions({camera.name: look.quality.border["bottom"]}) if options.tracker.body in WHOLE
                else sitting_cautions(film.masks, [frame.time for frame in sample.frames]))
-    doubts = (*_several_people(film), *posture, *_doubts(look, footage), *film_cautions(footage),
+    several = _several_people(film, HARMFUL if options.people is None else NOTED)
+    doubts = (*several, *posture, *_doubts(look, footage), *film_cautions(footage),
               *recovery_cautions([camera.name], [film.silhouettes]), *clutter_cautions(look.left_out))
     return replace(look, findings=(*doubts, *look.quality.warnings()))
 
 
-def _several_people(film: FilmSurvey) -> list[Finding]:
+def _several_people(film: FilmSurvey, severity: int) -> list[Finding]:
     number = count_in_picture(film.sample, film.silhouettes)
     if number < 2:
         return []
     return [Finding.of("{people} people are in the picture: one camera tracks one, the nearest, who is the largest in the picture; two "
-                       "calibrated cameras or more track all", "{people} people; the nearer one is tracked", HARMFUL, people=number)]
+                       "calibrated cameras or more track all", "{people} people; the nearer one is tracked", severity, people=number)]
 
 
 def known_scale(footage: Footage) -> str:

@@ -19,12 +19,13 @@ from shadowpuppet.pipeline.findings.cautions import (
     recovery_cautions,
     unlike_ready,
 )
+from shadowpuppet.pipeline.findings.delays import delay_cautions
 from shadowpuppet.pipeline.findings.film import of_several, survey_films
 from shadowpuppet.pipeline.findings.look import CameraLook, FilmSurvey, FirstSeconds, RigLook, Survey
 from shadowpuppet.pipeline.findings.opening import OPENING, first_seconds, opening_of
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.people.census import Census, later_sets, sampled_sets, take_census
+from shadowpuppet.pipeline.people.census import Census, are_apart, later_sets, sampled_sets, take_census
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.threads import one_opencv_thread
@@ -33,6 +34,10 @@ from shadowpuppet.tracking.people.views import View, views_of
 
 SILHOUETTES_OR_CAMERAS = "silhouettes do not fit together: film the empty scene, or calibrate"
 """Ten words on an agreement that an empty scene recovered from the film may have spoiled."""
+UNSEEN = ("the project states several people (multi_person = true in Config.toml), but fewer than two are found against an empty scene "
+          "that is made of the films, into which people vanish who never leave: film the empty scene (background/<camera>.mp4), bring "
+          "masks (--masks), or write multi_person = false for one person")
+"""Why a project of several people is refused."""
 COMPARED = 3
 """Number of views of a person in which each camera is compared with the others, where several people are seen."""
 ENOUGH = 3
@@ -55,6 +60,9 @@ def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, fil
         share = SharedShadows(rig.cameras)
         sampled, later = sampled_sets([film.sample for film in films], wide, share), later_sets(rig, wide, float(seen), share)
         census, spread = take_census(rig.cameras, sampled, later), [*sampled, *later]
+    counted = census.number if census is not None else 0
+    if census is not None and options.people is not None and not (options.people == 1 < counted and are_apart(spread)):
+        census = replace(census, number=options.people)
     several = census.number if census is not None and census.number > 1 else 0
     if several:
         films = tuple(map(of_several, films))
@@ -65,13 +73,18 @@ def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, fil
     agree = _agreement_of_people(rig, census, first) if census is not None and several else _agreement_of_one(rig, first, spread)
     look = RigLook(recording=str(rig.recording.path), cameras=tuple(map(_camera_look, rig.footage, films)), rate=rig.rate, frames=rig.count,
                    agreement=agree)
-    refusal = _rig_refusal(look, first)
     recovered = frozenset(camera.name for camera, each in zip(look.cameras, silhouettes, strict=True) if each.recovered is not None)
+    refusal = _rig_refusal(look, first) or (UNSEEN if rig.recording.several and recovered and not several else None)
     doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     doubts += [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
-    if several:
+    if not (refusal or several or agree.doubts()):
+        doubts += delay_cautions(rig, silhouettes, options.masks)
+    if several and options.people != 1:
         doubts.insert(0, Finding.of("{people} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
                                     "{people} people: each is tracked", NOTED, people=several))
+    elif counted > 1:
+        doubts.insert(0, Finding.of("{people} people were counted; one is tracked, others are ignored (--people 1)",
+                                    "{people} people: one is tracked, others are ignored", NOTED, people=counted))
     look = replace(look, refusal=refusal, findings=() if refusal else tuple(doubts))
     for each in silhouettes:
         each.classified.clear()

@@ -99,6 +99,12 @@ def take_census(cameras: Sequence[Camera], sets: Sequence[Seen], later: Sequence
     return Census(max(counted(numbers[:begun]), counted(numbers[begun:]), counted(certain, share=0.0)), floor, numbers)
 
 
+def are_apart(sets: Sequence[Seen]) -> bool:
+    """Whether two cameras show several people apart from each other, so that these are not one person whom the cameras place apart."""
+    each = zip(*(seen.masks for seen in sets))
+    return sum(counted([people_in(mask) for mask in masks if mask is not None]) > 1 for masks in each) > 1
+
+
 def count_in_picture(sample: Sample, silhouettes: Silhouettes) -> int:
     """Number of people whom one camera shows apart from each other, in frames sampled from its film."""
     if not sample.frames:

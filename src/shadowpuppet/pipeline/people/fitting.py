@@ -8,15 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from shadowpuppet.body.models import sizes_kind
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import evenly_spread
+from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.person_rig import MultiviewSubject, average_person, fit_in_views
-from shadowpuppet.tracking.people.figures import Figure
+from shadowpuppet.pipeline.people.state import Measured
+from shadowpuppet.pipeline.person_rig import MultiviewSubject, average_person, fit_in_views, known_person
 from shadowpuppet.tracking.people.floor import Floor
-from shadowpuppet.tracking.people.presence import UPRIGHT
+from shadowpuppet.tracking.people.presence import Followed, Sighting
 from shadowpuppet.tracking.people.views import views_of
 
 VIEWS, MIN_SETS, MOST_SETS = 3, 4, 16
@@ -26,12 +27,11 @@ TALL = 0.8, 2.3
 """Least and greatest height of a person, metres, that is expected of a figure; the sizes are refined from there."""
 
 
-def fit_apart(rng: np.random.Generator, cameras: Sequence[Camera], floor: Floor, options: Options, rate: float,
-              seen: Sequence[tuple[Figure, Sequence[Figure], Sequence[Mask | None]]]) -> MultiviewSubject:
-    """Fit one person to frame sets: their figure, the others' and the masks (H, W) of each; and make the tracker for `rate` frames/s. Who
-    is not seen apart in enough views has the average sizes for the figure's height."""
-    tall = float(np.clip(np.percentile([figure.height for figure, *_ in seen], UPRIGHT), *TALL))
-    views = [views_of(floor, *each) for each in seen]
+def fit_apart(rng: np.random.Generator, floor: Floor, options: Options, rate: float, seen: Sequence[Sighting]) -> Measured:
+    """The sizes of one person, fitted to frame sets; `rate`: frames/s. A person who is not seen apart in enough views has the average sizes
+    for the figure's height."""
+    cameras, tall = floor.cameras, float(np.clip(Followed(tuple(seen)).height, *TALL))
+    views = [views_of(floor, each.figure, each.others, each.masks) for each in seen]
     apart = [view for view in views if sum(mask is not None for mask in view) >= min(VIEWS, len(cameras))]
     subject = None
     if len(apart) >= min(MIN_SETS, len(seen)):
@@ -39,9 +39,21 @@ def fit_apart(rng: np.random.Generator, cameras: Sequence[Camera], floor: Floor,
         with contextlib.suppress(TrackingError):
             # fronts are found while people are tracked
             subject = fit_in_views(rng, cameras, chosen, replace(options, height=None), rate, tall, both_fronts=False)
-    return unsettled(subject or average_person(rng, cameras, options, rate, tall))
+    return Measured.of(subject or average_person(rng, cameras, options, rate, tall))
 
 
-def unsettled(subject: MultiviewSubject) -> MultiviewSubject:
-    """A person among others: what their body does not explain is not left out, as it may be somebody."""
+def known_sizes(options: Options) -> Measured:
+    """The sizes of a person that were saved. Raises `FormatError`."""
+    assert options.person is not None
+    person, source = read_person(options.person, options.multiview.body), str(options.person)
+    sizes = person.sizes.to_array()
+    return Measured(sizes, person.height, source, {"source": source, "sizes": dict(zip(person.sizes.names(), map(float, sizes)))}, True)
+
+
+def one_of_several(rng: np.random.Generator, cameras: Sequence[Camera], options: Options, rate: float,
+                   measured: Measured) -> MultiviewSubject:
+    """A person of known sizes among others, and the tracker for `rate` frames/s: what the body does not explain is not left out, as it may
+    be another person."""
+    person = Person(sizes_kind(options.multiview.body).from_array(measured.sizes), measured.height, measured.source)
+    subject = known_person(rng, cameras, options, rate, person, dict(measured.summary), measured.is_measured)
     return replace(subject, tracker=replace(subject.tracker, looks=0))

@@ -1,37 +1,39 @@
-"""The people of a recording while it is tracked: those present, new ones, and those who have left."""
+"""The people of a recording, frame set by frame set: silhouettes are divided among them, each is tracked, and their fronts are weighed."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.camera.mask import Mask, Seen
+from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array
-from shadowpuppet.pipeline.people.fronts import face_the_way
-from shadowpuppet.pipeline.people.later_sizes import measure_later
-from shadowpuppet.pipeline.people.member import Fit, Look, Member, Sighting
+from shadowpuppet.motion.motion import MotionFrame
+from shadowpuppet.pipeline.people.later_sizes import measured_later
+from shadowpuppet.pipeline.people.state import Measured, PeopleState, PersonState
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
+from shadowpuppet.pipeline.subject import motion_frame
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.people.appearance import Colours, apart_from, colours_of_body, colours_of_figure, dressed_parts
 from shadowpuppet.tracking.people.evidence import Drawn, draw_person, predicted
 from shadowpuppet.tracking.people.figures import Figure, drawn, find_people
 from shadowpuppet.tracking.people.floor import Floor
-from shadowpuppet.tracking.people.identity import CLEAR, DIFFERENT, Exchange, Identity
-from shadowpuppet.tracking.people.presence import Followed, follow
-from shadowpuppet.tracking.people.tracker import Person, explained, follow_turned, place_of, start, step
+from shadowpuppet.tracking.people.front import face
+from shadowpuppet.tracking.people.identity import CLEAR, DIFFERENT, Identity
+from shadowpuppet.tracking.people.presence import Followed, Sighting, follow, sightings
+from shadowpuppet.tracking.people.tracker import Person, Share, explained, follow_turned, place_of, start, step
 
 LOOK_SECONDS = 0.2
 """Seconds from one look for people to the next."""
 NEW_SECONDS, NEW_LOOKS = 0.5, 3
-"""Seconds and number of looks through which a figure that no tracked body explains must last to count as a new person."""
-FORGET_SECONDS = 0.5
-"""Time after which such a figure is forgotten."""
+"""Seconds and number of looks through which a figure that no tracked body explains must last to count as a new person; after the seconds
+such a figure is forgotten."""
 GONE_SECONDS = 1.0
 """Time for which a person is lost until they count as gone."""
 SAME_PLACE = 0.6
@@ -41,209 +43,248 @@ SAME_HEIGHT = 0.1
 CLOSE, WITHIN = 0.6, 0.2
 """Distance (m) of two people below which they may be exchanged; below which motion does not tell whether they were."""
 
-Images = Sequence[NDArray[np.uint8] | None]
-"""A picture (H, W, 3) or (H, W) a camera; empty: clothes are not looked at."""
+
+class Frames(NamedTuple):
+    """What one frame set shows."""
+
+    time: float
+    """Seconds."""
+    points: SurfacePoints
+    """Surface points of the visual hull of all people."""
+    seen: Seen
+    images: Sequence[NDArray[np.uint8] | None] = ()
+    """A picture (H, W, 3) or (H, W) that fits the silhouettes, per camera; empty: clothes are not looked at."""
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Group:
-    """All people of a recording, also those who have left."""
+    """Steps from the people of one frame set to those of the next. The same state and frame set give the same."""
 
     floor: Floor
     hull: VisualHull
-    fit: Fit
-    rng: np.random.Generator
-    members: list[Member] = field(default_factory=list)
-    coming: list[Followed] = field(default_factory=list)
-    seen: dict[int, Look] = field(default_factory=dict)
-    """The looks that `coming` refers to, by number."""
-    looks: int = 0
-    due: float = -np.inf
-    identity: Identity = field(default_factory=Identity)
-    exchanges: list[Exchange] = field(default_factory=list)
-    """People who were exchanged, as their colours told later."""
+    fit: Callable[[np.random.Generator, Sequence[Sighting]], Measured]
+    """Measures a person where they are seen."""
+    subject: Callable[[Measured], MultiviewSubject]
+    """The person of sizes, and the tracker."""
+    seed: int = 0
+    most: int | None = None
+    """Greatest number of people; None: any."""
 
-    def add(self, subject: MultiviewSubject, height: float, place: Array) -> Member:
-        """A new person, not yet tracked, whose figure is first seen at a place (2,)."""
-        self.members.append(Member(len(self.members) + 1, subject, self.rng.spawn(1)[0], None, height, place))
-        return self.members[-1]
+    def next(self, people: PeopleState, frames: Frames) -> PeopleState:
+        """The people after one more frame set."""
+        if not people.is_begun and len(frames.points.points):
+            people = self.start(people, frames)._replace(is_begun=True)
+        after = self._tracked(people, frames)
+        if frames.time >= people.due:
+            after = self._looked(after._replace(due=frames.time + LOOK_SECONDS), frames)
+        gone = [person._replace(state=None, share=None, lost_since=None, before=None) for person in after.present
+                if person.lost_since is not None and frames.time - person.lost_since >= GONE_SECONDS]  # fmt: skip
+        after = after.having(*gone)
+        return after.having(*(self._framed(after, person, frames.time) for person in after.people))._replace(sets=people.sets + 1)
 
-    def start(self, time: float, points: SurfacePoints, seen: Seen) -> None:
-        """Start the measured people, each at the nearest figure of the first frame set; arguments as for `next`."""
-        figures = find_people(self.floor, seen)
-        pairs = sorted((float(np.linalg.norm(figure.place - member.place)), member.number, n)
-                       for member in self.members for n, figure in enumerate(figures))  # fmt: skip
+    def start(self, people: PeopleState, frames: Frames) -> PeopleState:
+        """The measured people, each begun at the nearest figure of the first frame set."""
+        figures = find_people(self.floor, frames.seen)
+        pairs = sorted((float(np.linalg.norm(figure.place - person.place)), person.number, n)
+                       for person in people.people for n, figure in enumerate(figures))  # fmt: skip
         of = dict[int, Figure]()
         for _, number, n in pairs:
             if number not in of and all(figures[n] is not figure for figure in of.values()):
                 of[number] = figures[n]
-        for _ in range(2):  # the second time for people who were hidden by others that were not known yet
+        for attempt in range(2):  # the second time for people who were hidden by others that were not known yet
             for number, figure in of.items():
-                member = self.members[number - 1]
-                if member.state is None or member.state.status != "tracked":
-                    self.begin(member, time, figure, self.drawn(), points, seen.masks)
+                person = people.people[number - 1]
+                if person.state is None or person.state.status != "tracked":
+                    people = people.having(self.begun(person, figure, self.drawn(people), frames, self.rng(attempt, number, people)))
+        return people
 
-    @property
-    def present(self) -> list[Member]:
-        """The people who are there."""
-        return [member for member in self.members if member.state is not None]
+    def rng(self, *which: int | PeopleState) -> np.random.Generator:
+        """The random numbers of some purpose, person and frame set."""
+        return np.random.default_rng([self.seed, *(each.sets if isinstance(each, PeopleState) else each for each in which)])
 
-    @property
-    def is_clear(self) -> bool:
-        """Whether all people are tracked and no other seems to come: else what bodies leave unexplained says nothing about cameras."""
-        return not self.coming and all(member.state is not None and member.state.status == "tracked" for member in self.present)
+    def tracker_of(self, person: PersonState, rng: np.random.Generator) -> Person:
+        """How a person who is there is tracked, and where they are."""
+        assert person.state is not None
+        return Person(self.subject(person.measured).tracker, rng, person.state)
 
-    def next(self, time: float, points: SurfacePoints, seen: Seen, images: Images = ()) -> None:
-        """Update all people by a frame set's surface points and silhouettes, and the images that fit these, one per camera."""
-        people = {member.number: Person(member.subject.tracker, member.rng, member.state)
-                  for member in self.present if member.state is not None}  # fmt: skip
-        for number, share in step(people, points, seen.masks).items():
-            member = self.members[number - 1]
-            member.state, member.share = share.state, share
-            lost = share.state.status == "lost"
-            member.lost_since = (time if member.lost_since is None else member.lost_since) if lost else None
-        with ThreadPoolExecutor(max(min(len(people), usable_cores()), 1), "people") as pool:
-            list(pool.map(lambda number: face_the_way(self.members[number - 1], time), people))  # raises what one of them raised
-        if time >= self.due:
-            self.due = time + LOOK_SECONDS
-            self._look(time, points, seen, images)
-        for member in self.present:
-            if member.lost_since is not None and time - member.lost_since >= GONE_SECONDS:
-                member.state = member.share = member.lost_since = member.before = None
+    def drawn(self, people: PeopleState) -> dict[int, Drawn]:
+        """The bodies of the people present, as predicted for the next frame."""
+        bodies = ((person.number, self.subject(person.measured).tracker, person.state) for person in people.present)
+        return {number: draw_person(tracker, predicted(tracker.body, state)) for number, tracker, state in bodies if state is not None}
 
-    def _look(self, time: float, points: SurfacePoints, seen: Seen, images: Images) -> None:
+    def _tracked(self, people: PeopleState, frames: Frames) -> PeopleState:
+        """Everybody present, tracked on their part of the silhouettes, with the odds of their front."""
+        rngs = {person.number: self.rng(2, person.number, people) for person in people.present}
+        shares = step({person.number: self.tracker_of(person, rngs[person.number]) for person in people.present}, frames.points,
+                      frames.seen.masks)
+
+        def faced(person: PersonState) -> PersonState:
+            return self._faced(person, shares[person.number], frames.time, rngs[person.number])
+
+        with ThreadPoolExecutor(max(min(len(shares), usable_cores()), 1), "people") as pool:
+            return people.having(*pool.map(faced, people.present))
+
+    def _faced(self, person: PersonState, share: Share, time: float, rng: np.random.Generator) -> PersonState:
+        """A person with a share of a frame set, and the odds of the front."""
+        if share.state.status == "lost":
+            since = time if person.lost_since is None else person.lost_since
+            return person._replace(state=share.state, share=share, lost_since=since, front=person.front.lost(), shown=())
+        measured = person.measured
+        front, state = face(person.front, self.subject(measured).tracker, rng, share, time, measured.is_measured)
+        shown = person.shown if state is share.state else ()
+        return person._replace(state=state, share=share._replace(state=state), lost_since=None, front=front, shown=shown)
+
+    def _framed(self, people: PeopleState, person: PersonState, time: float) -> PersonState:
+        """A person with the motion of the frame set; while the front is unknown, with what it is if the body is turned round."""
+        if person.state is None or person.share is None:
+            return person._replace(frame=MotionFrame(time, "absent"), before=None)
+        subject = self.subject(person.measured)
+        frame, before = motion_frame(subject, time, person.state, person.observation, person.before)
+        frame = would_be = doubted(frame) if people.identity.is_doubted(person.number) else frame
+        front = person.front
+        if not front.is_known and front.other is not None:
+            other = motion_frame(subject, time, front.other, person.observation)[0]
+            front = front.with_frame(plain(would_be), plain(other))
+        return person._replace(frame=frame if person.is_front_sure else doubted(frame), before=before, front=front)
+
+    def _looked(self, people: PeopleState, frames: Frames) -> PeopleState:
         """See who is who, and find new, returning and lost people among the figures that no tracked body explains."""
-        drawn = {member.number: member.share.drawn for member in self.present if member.share is not None and member.lost_since is None}
-        masks = seen.masks
-        figures = find_people(self.floor, seen, explained(drawn))
-        places = [place_of(member.subject.body, member.state) for member in self.present
-                  if member.state is not None and member.lost_since is None]  # fmt: skip
-        free = [figure for figure in figures if all(np.linalg.norm(place - figure.place) > SAME_PLACE for place in places)]
-        worn = self._gather(time, drawn, free, masks, images) if any(image is not None for image in images) else [None] * len(free)
-        self._tell_apart(time)
-        for member in self.present:
-            measure_later(member, time)
-        self.looks += 1
-        of_free = {id(figure): colours for figure, colours in zip(free, worn)}
-        self.seen[self.looks] = Look(figures, masks, [of_free.get(id(figure)) for figure in figures])
-        self.coming = follow([each for each in self.coming if time - each.times[-1] <= FORGET_SECONDS], self.looks, time, free)
-        for each in list(self.coming):
-            if len(each.sets) >= NEW_LOOKS and each.times[-1] == time and time - each.times[0] >= NEW_SECONDS - 1e-6:
-                self._enter(each, time, drawn, points, masks)
-                self.coming.remove(each)
-        oldest = min((each.sets[0] for each in self.coming), default=self.looks)
-        self.seen = {n: seen for n, seen in self.seen.items() if n >= oldest}
+        bodies = {person.number: person.share.drawn for person in people.present
+                  if person.share is not None and person.lost_since is None}  # fmt: skip
+        figures = find_people(self.floor, frames.seen, explained(bodies))
+        places = [self.place(person) for person in people.present if person.lost_since is None]
+        found = [each for each in sightings(frames.time, figures, frames.seen.masks)
+                 if all(np.linalg.norm(place - each.figure.place) > SAME_PLACE for place in places)]  # fmt: skip
+        if any(image is not None for image in frames.images):
+            identity, worn = self.colours(people, bodies, [each.figure for each in found], frames)
+            people = people._replace(identity=identity)
+            found = [each._replace(worn=colours) for each, colours in zip(found, worn)]
+        people = self._told_apart(people, frames.time)
+        people = people.having(*(measured_later(each, self.subject(each.measured), self.rng(3, each.number, people), frames.time)
+                                 for each in people.present))  # fmt: skip
+        coming = follow([each for each in people.coming if frames.time - each.last.time <= NEW_SECONDS], found)
+        for each in list(coming):
+            first = each.sightings[0].time
+            if len(each.sightings) >= NEW_LOOKS and each.last.time == frames.time and frames.time - first >= NEW_SECONDS - 1e-6:
+                people = self._entered(people, each, bodies, frames)
+                coming.remove(each)
+        return people._replace(coming=tuple(coming))
 
-    def _gather(self, time: float, bodies: Mapping[int, Drawn], free: Sequence[Figure], masks: Sequence[Mask | None],
-                images: Images) -> list[Colours | None]:
-        """See how people are dressed where only they are seen; returns the same of the free figures."""
-        cameras = self.floor.cameras
+    def colours(self, people: PeopleState, bodies: Mapping[int, Drawn], free: Sequence[Figure],
+                frames: Frames) -> tuple[Identity, list[Colours]]:
+        """What people wear, seen where nobody else is; and what the free figures do."""
+        cameras, masks, identity = self.floor.cameras, frames.seen.masks, people.identity
         beside = {number: body.masks_near() for number, body in bodies.items()}
         figures = [drawn(self.floor, figure) for figure in free]
         for number, body in bodies.items():
-            member = self.members[number - 1]
-            if member.state is not None and member.state.status == "tracked":
+            person = people.people[number - 1]
+            if person.state is not None and person.state.status == "tracked":
                 apart = apart_from(masks, [*figures, *(other for n, other in beside.items() if n != number)])
-                limbs = member.subject.body.limbs
+                limbs = self.subject(person.measured).body.limbs
                 assert limbs is not None
-                self.identity.see(number, time, colours_of_body(cameras, body.centres, body.radii, dressed_parts(limbs), apart, images))
-        return [colours_of_figure(cameras, figure.place, figure.height, self.floor.level,
-                                  apart_from(masks, [*beside.values(), *(other for other in figures if other is not own)]), images)
-                for figure, own in zip(free, figures)]  # fmt: skip
+                worn = colours_of_body(cameras, body.centres, body.radii, dressed_parts(limbs), apart, frames.images)
+                identity = identity.see(number, frames.time, worn)
+        return identity, [
+            colours_of_figure(cameras, figure.place, figure.height, self.floor.level,
+                              apart_from(masks, [*beside.values(), *(other for other in figures if other is not own)]), frames.images)
+            for figure, own in zip(free, figures)]
 
-    def _tell_apart(self, time: float) -> None:
+    def _told_apart(self, people: PeopleState, time: float) -> PeopleState:
         """Note who may have been exchanged because they are close, and put right who was."""
-        people = [(member, place_of(member.subject.body, member.state)) for member in self.present if member.state is not None]
-        for n, (one, place) in enumerate(people):
-            for other, there in people[n + 1 :]:
+        identity, present = people.identity, [(person, self.place(person)) for person in people.present]
+        for n, (one, place) in enumerate(present):
+            for other, there in present[n + 1 :]:
                 if (away := float(np.linalg.norm(place - there))) < CLOSE:
-                    lost = one.lost_since is not None or other.lost_since is not None
-                    self.identity.meet(one.number, other.number, time, is_open=lost or away < WITHIN)
-        exchange = self.identity.decide(time, [member.number for member, _ in people if member.lost_since is None])
-        if exchange is not None:
-            self._exchange(self.members[exchange.one - 1], self.members[exchange.other - 1], time)
-            self.exchanges.append(exchange)
+                    is_lost = one.lost_since is not None or other.lost_since is not None
+                    identity = identity.meet(one.number, other.number, time, is_open=is_lost or away < WITHIN)
+        identity, exchange = identity.decided(time, [person.number for person, _ in present if person.lost_since is None])
+        people = people._replace(identity=identity)
+        if exchange is None:
+            return people
+        one, other = (people.people[number - 1] for number in (exchange.one, exchange.other))
+        swapped = self._in_place_of(one, other, people), self._in_place_of(other, one, people)
+        return people.having(*swapped)._replace(exchanges=(*people.exchanges, exchange))
 
-    @staticmethod
-    def _exchange(one: Member, other: Member, time: float) -> None:
-        """Each of two people is where the other was."""
-        known = one.facing.is_known, other.facing.is_known
-        for name in ("state", "share", "lost_since", "walk"):
-            theirs = getattr(other, name)
-            setattr(other, name, getattr(one, name))
-            setattr(one, name, theirs)
-        for member, is_known in ((one, known[1]), (other, known[0])):
-            member.before = member.trial = None
-            if member.state is not None and member.share is not None:
-                member.state = follow_turned(member.subject.tracker, member.rng, member.state, member.share)
-                member.share = member.share._replace(state=member.state)
-                member.facing.begin(time, is_known)
+    def _in_place_of(self, person: PersonState, other: PersonState, people: PeopleState) -> PersonState:
+        """A person where another one was."""
+        person = person._replace(state=other.state, share=other.share, lost_since=other.lost_since, before=None,
+                                 front=person.front.begun(other.front.is_known))  # fmt: skip
+        if other.state is None or other.share is None:
+            return person
+        tracker = self.subject(person.measured).tracker
+        state = follow_turned(tracker, self.rng(4, person.number, people), other.state, other.share)
+        return person._replace(state=state, share=other.share._replace(state=state))
 
-    def _enter(self, found: Followed, time: float, drawn: dict[int, Drawn], points: SurfacePoints,
-               masks: Sequence[Mask | None]) -> None:
-        """Start tracking the person of a figure: a lost one near it, one of that height and those colours who has left, or a new one."""
-        figure = found.figures[-1]
-        alike = self._known(found)
+    def _entered(self, people: PeopleState, found: Followed, bodies: Mapping[int, Drawn], frames: Frames) -> PeopleState:
+        """The people with that of a figure: a lost one near it, one of that height and those colours who has left, or a new one."""
+        alike, number = self._known(people, found), len(people.people) + 1
+        if not alike and self.most is not None and number > self.most:
+            return people
         try:
-            member = alike[0] if alike else self.add(self.fit(self.rng, seen_in(found, self.seen)), found.height, figure.place)
+            person = alike[0] if alike else self.new(people, found)
         except TrackingError:
-            return
-        self.begin(member, time, figure, drawn, points, masks)
-        if member.state is not None and member.lost_since is None:
-            for other in alike[1:]:
-                self.identity.meet(member.number, other.number, time, is_open=True)
+            return people
+        person = self.begun(person, found.last.figure, bodies, frames, self.rng(5, person.number, people))
+        people = people.having(person)
+        for other in alike[1:] if person.state is not None and person.lost_since is None else ():
+            people = people._replace(identity=people.identity.meet(person.number, other.number, frames.time, is_open=True))
+        return people
 
-    def begin(self, member: Member, time: float, figure: Figure, drawn: dict[int, Drawn], points: SurfacePoints,
-              masks: Sequence[Mask | None]) -> None:
-        """Find a person's pose at the place of a figure, beside those who are `drawn`."""
-        others = {number: body for number, body in drawn.items() if number != member.number}
-        begun = start(member.subject.tracker, member.rng, figure, others, points, masks)
-        if begun is not None and begun.state.status != "lost":
-            member.state, member.lost_since, member.before = begun.state, None, None
-            member.facing.begin(time, begun.is_sided and member.subject.is_measured)
-            member.walk.forget()
+    def new(self, people: PeopleState, found: Followed) -> PersonState:
+        """A new person, measured where they are seen, and not yet tracked. Raises `TrackingError`."""
+        number = len(people.people) + 1
+        return PersonState(number, self.fit(self.rng(6, number, people), found.sightings), found.height, found.last.figure.place)
 
-    def _known(self, found: Followed) -> list[Member]:
+    def begun(self, person: PersonState, figure: Figure, bodies: Mapping[int, Drawn], frames: Frames,
+              rng: np.random.Generator) -> PersonState:
+        """A person found at the place of a figure, beside the bodies of others; as they were if they are not found."""
+        others = {number: body for number, body in bodies.items() if number != person.number}
+        found = start(self.subject(person.measured).tracker, rng, figure, others, frames.points, frames.seen.masks)
+        if found is None or found.state.status == "lost":
+            return person
+        front = person.front.begun(found.is_sided and person.measured.is_measured)
+        return person._replace(state=found.state, lost_since=None, before=None, front=front)
+
+    def _known(self, people: PeopleState, found: Followed) -> list[PersonState]:
         """The lost or absent people who a figure may be, the most likely first; none: a new person."""
-        away = [member for member in self.members if member.state is None or member.lost_since is not None]
-        alike = [member for member in away if abs(member.height - found.height) <= SAME_HEIGHT]
-        unlike = {member.number: self.identity.unlike(member.number, self._worn(found)) for member in alike}
-        alike = [member for member in alike if member.state is not None or not unlike[member.number] > DIFFERENT]
-        best = min((each for member in alike if np.isfinite(each := unlike[member.number])), default=np.inf)
+        seen = [each.worn for each in found.sightings if each.worn is not None]
+        worn = np.add.reduce(seen) if seen else None
+        away = [person for person in people.people if person.state is None or person.lost_since is not None]
+        unlike = {person.number: people.identity.unlike(person.number, worn) for person in away}
+        alike = [person for person in away if abs(person.height - found.height) <= SAME_HEIGHT
+                 and (person.state is not None or not unlike[person.number] > DIFFERENT)]  # fmt: skip
+        best = min((each for person in alike if np.isfinite(each := unlike[person.number])), default=np.inf)
 
-        def distance(member: Member) -> float:
-            if member.state is None:
-                return 10.0 + abs(member.height - found.height)
-            return float(np.linalg.norm(place_of(member.subject.body, member.state) - found.place))
+        def distance(person: PersonState) -> float:
+            if person.state is None:
+                return 10.0 + abs(person.height - found.height)
+            return float(np.linalg.norm(self.place(person) - found.last.figure.place))
 
-        return sorted((member for member in alike if not unlike[member.number] > best + CLEAR), key=distance)
+        return sorted((person for person in alike if not unlike[person.number] > best + CLEAR), key=distance)
 
-    def _worn(self, found: Followed) -> Colours | None:
-        """The colours of a figure that was followed."""
-        looks = [(self.seen[n], figure) for n, figure in zip(found.sets, found.figures)]
-        worn = [colours for look, figure in looks for other, colours in zip(look.figures, look.worn) if other is figure]
-        seen = [colours for colours in worn if colours is not None]
-        return np.add.reduce(seen) if seen else None
-
-    def drawn(self) -> dict[int, Drawn]:
-        """The bodies of the people present, as predicted for the next frame."""
-        return {member.number: draw_person(member.subject.tracker, predicted(member.subject.body, member.state))
-                for member in self.present if member.state is not None}  # fmt: skip
+    def place(self, person: PersonState) -> Array:
+        """Where a person who is there stands on the floor plan, of shape (2,), metres."""
+        assert person.state is not None
+        return place_of(self.subject(person.measured).body, person.state)
 
 
-def seen_in(found: Followed, looks: Mapping[int, Look]) -> list[Sighting]:
-    """Where a person is seen among others, in looks by number."""
-    return [(figure, [other for other in looks[n].figures if other is not figure], looks[n].masks)
-            for n, figure in zip(found.sets, found.figures)]  # fmt: skip
+def doubted(frame: MotionFrame) -> MotionFrame:
+    """The frame of a person who may face the other way, or be another one: nothing of it is `tracked`."""
+    limbs = None if frame.limb_status is None else tuple("uncertain" if each == "tracked" else each for each in frame.limb_status)
+    return frame._replace(status="uncertain" if frame.status == "tracked" else frame.status, limb_status=limbs)
 
 
-def first_people(floor: Floor, times: Sequence[float], sets: Sequence[Seen]) -> tuple[list[Followed], list[list[Figure]]]:
-    """The people in the frame sets of the first seconds: those seen in half of the sets or more, the longest seen first; and all figures of
-    each set."""
-    people, every = list[Followed](), list[list[Figure]]()
-    for n, (time, seen) in enumerate(zip(times, sets, strict=True)):
-        every.append(find_people(floor, seen))
-        people = follow(people, n, time, every[-1])
-    lasting = [each for each in people if 2 * len(each.sets) >= len(sets)]
-    return sorted(lasting, key=lambda each: (-len(each.sets), float(each.figures[0].place[0]))), every
+def plain(frame: MotionFrame) -> MotionFrame:
+    """A frame as a checkpoint can keep it, without its modes."""
+    return frame._replace(limb_status=None if frame.limb_status is None else tuple(frame.limb_status), modes=())
 
+
+def first_people(floor: Floor, times: Sequence[float], sets: Sequence[Seen], most: int | None = None) -> list[Followed]:
+    """The people in the frame sets of the first seconds: those seen in half of the sets or more, the longest seen first; at most the
+    `most` with the greatest evidence."""
+    people = list[Followed]()
+    for time, seen in zip(times, sets, strict=True):
+        people = follow(people, sightings(time, find_people(floor, seen), seen.masks))
+    lasting = [each for each in people if 2 * len(each.sightings) >= len(sets)]
+    lasting.sort(key=lambda each: -sum(one.figure.evidence for one in each.sightings))
+    return sorted(lasting[:most], key=lambda each: (-len(each.sightings), float(each.sightings[0].figure.place[0])))

@@ -15,26 +15,23 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.bits import Bits
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError
 from shadowpuppet.io.inputs.inputs import NO_INPUTS, Resuming
 from shadowpuppet.io.people import open_places, person_folder, write_place
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import RunWriter, write_metrics
-from shadowpuppet.motion.motion import Motion, MotionFrame
+from shadowpuppet.motion.motion import BLANK, Motion, MotionFrame
 from shadowpuppet.pipeline.findings.look import RigLook, Survey
 from shadowpuppet.pipeline.findings.verdict import verdict_of_run
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.overlay_video import overlay_of_people
 from shadowpuppet.pipeline.people.census import Census
-from shadowpuppet.pipeline.people.fitting import fit_apart
-from shadowpuppet.pipeline.people.group import Group, first_people, seen_in
-from shadowpuppet.pipeline.people.kept import TYPES, KeptGroup, kept, remade, restore
-from shadowpuppet.pipeline.people.member import Look, Member, Sighting
-from shadowpuppet.pipeline.people.retracing import Packed, Stretch, packed, retraced, stretches, with_final_bodies
+from shadowpuppet.pipeline.people.corrections import put_right
+from shadowpuppet.pipeline.people.fitting import fit_apart, known_sizes, one_of_several
+from shadowpuppet.pipeline.people.group import Frames, Group, first_people
+from shadowpuppet.pipeline.people.state import TYPES, Measured, PeopleState, PersonState
 from shadowpuppet.pipeline.people.truths import matched_truths
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.pipeline.progress import (
@@ -52,16 +49,12 @@ from shadowpuppet.pipeline.progress import (
     warn_of_set_aside,
     write_beside,
 )
-from shadowpuppet.pipeline.rig import FrameSet, Rig, read_frames
-from shadowpuppet.pipeline.subject import joint_names, motion_frame
+from shadowpuppet.pipeline.rig import FrameSet, Rig
+from shadowpuppet.pipeline.subject import joint_names
 from shadowpuppet.threads import usable_cores
-from shadowpuppet.tracking.frozen import Interval
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
-from shadowpuppet.tracking.people.exchanges import given_back
-from shadowpuppet.tracking.people.facing import Doubted
-from shadowpuppet.tracking.people.presence import Followed
-from shadowpuppet.tracking.people.tracker import place_of
+from shadowpuppet.tracking.people.presence import Followed, Sighting
 from shadowpuppet.video import write_frames
 
 Smooth = Callable[[RunWriter, Sequence[tuple[int, MultiviewSubject]], Options, Listener, Motion], None]
@@ -70,8 +63,9 @@ Smooth = Callable[[RunWriter, Sequence[tuple[int, MultiviewSubject]], Options, L
 
 def check_people(options: Options) -> None:
     """Raise a `ShadowPuppetError` for what a run of several people cannot do."""
-    if options.person is not None:
-        raise SettingsError(f"person: found {options.person} for several people, expected none: each is measured")
+    if options.person is not None and options.people != 1:
+        raise SettingsError(f"person: found {options.person} for several people, expected none: each is measured; --people 1 "
+                            "follows one")
 
 
 class Carried(NamedTuple):
@@ -85,9 +79,7 @@ class Carried(NamedTuple):
     """Number of frames of each person, by their numbers; 0 for one without a run so far."""
     clear: NDArray[np.bool_]
     """For each frame set, whether cameras could be judged in it."""
-    begun: bool
-    """Whether the first people have been looked for."""
-    group: KeptGroup
+    people: PeopleState
 
 
 @dataclass(eq=False)
@@ -109,7 +101,6 @@ class PeopleRun:
         self.folder: Path = self.writer.folder
         self.writers = dict[int, RunWriter]()
         self.metrics = dict[str, Any]()
-        self.aside: Sequence[Interval] = ()
         self.sets = 0
         """Number of frame sets that were read."""
 
@@ -119,11 +110,13 @@ class PeopleRun:
         if carried is not None and not is_same_look(carried.look, json_text(self.survey.look)):
             raise ShadowPuppetError(f"{self.folder}: the run there cannot go on: its look.json differs from what the recording gives now")
         self.listener.begin(f"measuring {self.census.number} people")
-        group = self._group(for_fit, for_track, carried)
+        group, people = self._group(for_fit, for_track, carried)
         with ExitStack() as stack:
-            self._follow(group, stack, carried)
-            for number, motion in self._put_right(group).items():
-                smooth(self.writers[number], [(0, group.members[number - 1].subject)], self.options, self.listener, motion)
+            people = self._follow(group, people, stack, carried)
+            motions = {number: writer.motion for number, writer in self.writers.items()}
+            for number, motion in put_right(people, motions, group.subject).items():
+                subject = group.subject(people.people[number - 1].measured)
+                smooth(self.writers[number], [(0, subject)], self.options, self.listener, motion)
             truths = matched_truths({n: writer.motion for n, writer in self.writers.items()}, self.rig.recording.truths)
             for n, truth in truths.items():
                 self.writers[n].info["truth"] = str(truth.resolve())
@@ -131,32 +124,6 @@ class PeopleRun:
         found = {n: self._finished(n, truths.get(n)) for n in self.writers}
         write_metrics(self.folder, self.metrics | {"people": len(found)})
         warn_of_set_aside(self.metrics.get("set_aside", []))
-        return found
-
-    def _put_right(self, group: Group) -> dict[int, Motion]:
-        """The people's motions with what became known later: which way they faced, and who was who."""
-        motions, people = dict[int, Motion](), dict[int, tuple[Body, BoneSizes]]()
-        for number, writer in self.writers.items():
-            member = group.members[number - 1]
-            body, sizes = member.subject.body, member.subject.person.sizes
-            assert isinstance(sizes, BoneSizes)  # of a whole body
-            motions[number], people[number] = member.facing.corrected(writer.motion, body, sizes), (body, sizes)
-        motions = with_final_bodies(group, motions)
-        if wanted := stretches(group, motions):
-            self.listener.begin("following people back to the beginning")
-            motions = retraced(group, motions, wanted, self._silhouettes_of(wanted))
-        return given_back(motions, group.exchanges, people)
-
-    def _silhouettes_of(self, wanted: Sequence[Stretch]) -> list[Packed]:
-        """The silhouettes of some stretches, read again, without those of cameras that were set aside."""
-        segment, last, found = [each.segmented for each in self.survey.silhouettes], max(each.until for each in wanted), list[Packed]()
-        with closing(read_frames(self.rig, segment, ready=self.options.masks, every=self.options.every)) as frames:
-            for now in frames:
-                if now.time >= last:
-                    break
-                if any(each.begin - 1e-6 <= now.time < each.until for each in wanted):
-                    aside = {each.camera for each in self.aside if each.begin <= now.time <= each.end}
-                    found.append(packed(now.time, [None if n in aside else mask for n, mask in enumerate(now.seen.masks)]))
         return found
 
     def _finished(self, number: int, truth: Path | None) -> dict[str, Any]:
@@ -170,41 +137,46 @@ class PeopleRun:
         write_metrics(folder, metrics)
         return metrics
 
-    def _group(self, for_fit: np.random.Generator, for_track: np.random.Generator, carried: Carried | None) -> Group:
-        """The people of the first seconds, measured, or those of a checkpoint."""
-        rate, floor = self.rig.rate / self.options.every, self.census.floor
-        first = self.survey.first
+    def _group(self, for_fit: np.random.Generator, for_track: np.random.Generator, carried: Carried | None) -> tuple[Group, PeopleState]:
+        """How people are followed; and those of the first seconds, measured, or those of a checkpoint."""
+        rate, floor, first, options = self.rig.rate / self.options.every, self.census.floor, self.survey.first, self.options
+        subjects, known = dict[bytes, MultiviewSubject](), None if options.person is None else known_sizes(options)
+        fit_seed, track_seed = (int(rng.integers(2**63)) for rng in (for_fit, for_track))
 
-        def fit(rng: np.random.Generator, sets: Sequence[Sighting]) -> MultiviewSubject:
-            return fit_apart(rng, self.rig.cameras, floor, self.options, rate, sets)
+        def subject(measured: Measured) -> MultiviewSubject:
+            key = measured.sizes.tobytes()
+            if key not in subjects:
+                subjects[key] = one_of_several(np.random.default_rng(fit_seed), self.rig.cameras, options, rate, measured)
+            return subjects[key]
 
-        group = Group(floor, VisualHull(self.rig.cameras, self.options.multiview.hull, company=True), fit, for_track)
+        def fit(rng: np.random.Generator, seen: Sequence[Sighting]) -> Measured:
+            return fit_apart(rng, floor, options, rate, seen) if known is None else known
+
+        hull = VisualHull(self.rig.cameras, options.multiview.hull, company=True)
+        group = Group(floor, hull, fit, subject, track_seed, options.people)
         if carried is not None:
-            restore(group, carried.group, lambda held: remade(for_fit, self.rig.cameras, self.options, rate, held))
-            return group
-        people, every = first_people(floor, first.times, [first.seen(n) for n in range(len(first.times))])
-        seen = {n: Look(figures, masks, ()) for n, (figures, masks) in enumerate(zip(every, first.masks))}
+            return group, carried.people
+        found = first_people(floor, first.times, [first.seen(n) for n in range(len(first.times))], options.people)
 
-        def measured(found: Followed, seed: int) -> MultiviewSubject | None:
+        def measured(found: Followed, seed: int) -> Measured | None:
             try:
-                return fit(np.random.default_rng(seed), seen_in(found, seen))
+                return fit(np.random.default_rng(seed), found.sightings)
             except TrackingError:
                 return None  # may be found later
 
         with ThreadPoolExecutor(usable_cores(), "sizes") as pool:
-            subjects = list(pool.map(measured, people, for_fit.integers(2**63, size=len(people)).tolist()))
-        for found, subject in zip(people, subjects):
-            if subject is not None:
-                group.add(subject, found.height, found.figures[0].place)
-        return group
+            fitted = list(pool.map(measured, found, for_fit.integers(2**63, size=len(found)).tolist()))
+        people = [(each, sizes) for each, sizes in zip(found, fitted) if sizes is not None]
+        return group, PeopleState(tuple(PersonState(n, sizes, each.height, each.sightings[0].figure.place)
+                                        for n, (each, sizes) in enumerate(people, 1)))  # fmt: skip
 
-    def _follow(self, group: Group, stack: ExitStack, carried: Carried | None) -> None:
-        """For each frame set: segment, compute the hull, update all people, write."""
+    def _follow(self, group: Group, people: PeopleState, stack: ExitStack, carried: Carried | None) -> PeopleState:
+        """For each frame set: segment, compute the hull, follow all people, write. Returns the last state."""
         survey, options, timer, checkpoints = self.survey, self.options, StageTimer(), Checkpoints()
         look = survey.look
         assert isinstance(look, RigLook)
         rate = look.rate if np.isfinite(look.rate) else FALLBACK_RATE
-        watch, begun = RigWatch(len(self.rig.footage), self.rig.short), carried is not None and carried.begun
+        watch = RigWatch(len(self.rig.footage), self.rig.short)
         self.listener.begin("tracking", tracked(look.frames, options.every))
         began = time.perf_counter()
         write_beside(self.folder, look, self.rig)
@@ -214,10 +186,10 @@ class PeopleRun:
                     hull=group.hull)
         frames = stack.enter_context(closing(frames_beside(task)))
         clear = [] if carried is None else carried.clear.tolist()
-        earlier = iter(self._earlier(group, carried, stack))
+        earlier = iter(self._earlier(group, people, carried, stack))
 
         def judged(now: FrameSet, found: Mapping[int, MotionFrame], is_clear: bool) -> None:
-            subjects = {n: group.members[n - 1].subject_at(frame.time) for n, frame in found.items()}
+            subjects = {n: group.subject(people.people[n - 1].sizes_at(frame.time)) for n, frame in found.items()}
             drawn = [subjects[n].drawn(frame) for n, frame in found.items()]
             watch.tracked(_together(drawn) if is_clear else ())
             if overlay is not None:
@@ -235,93 +207,71 @@ class PeopleRun:
                     if points is None or not all(map(operator.is_, seen.masks, now.seen.masks)):
                         points = group.hull.points(seen.masks)
                 with timer.time("track"):
-                    if not begun and len(points.points):
-                        begun = True
-                        group.start(now.time, points, seen)
-                    group.next(now.time, points, seen, now.corrected if options.appearance else ())
+                    people = group.next(people, Frames(now.time, points, seen, now.corrected if options.appearance else ()))
                 with timer.time("write"):
-                    found = self._write(group, now, stack, places)
-                    clear.append(group.is_clear)
+                    found = self._write(group, people, stack, places)
+                    clear.append(people.is_clear)
                     judged(now, found, clear[-1])
-                    checkpoints.keep(partial(self._keep, group, places, clear, begun))
+                    checkpoints.keep(partial(self._keep, people, places, clear))
                 self.listener.advance(len(clear))
         finally:
-            self.aside, self.sets = watch.intervals, len(clear)
+            self.sets = len(clear)
             count = len(clear) - (0 if carried is None else len(carried.clear))
             self.metrics |= timings(timer, STAGES, count, time.perf_counter() - began) | set_aside(watch.intervals, self.rig.names)
+        return people
 
-    def _keep(self, group: Group, places: BinaryIO, clear: Sequence[bool], begun: bool) -> None:
+    def _keep(self, people: PeopleState, places: BinaryIO, clear: Sequence[bool]) -> None:
         """Write a checkpoint."""
-        numbers = tuple(len(self.writers[member.number]) if member.number in self.writers else 0 for member in group.members)
-        self.writer.checkpoint(Carried(json_text(self.survey.look), places.tell(), numbers, np.array(clear), begun, kept(group)))
+        numbers = tuple(len(self.writers[each.number]) if each.number in self.writers else 0 for each in people.people)
+        self.writer.checkpoint(Carried(json_text(self.survey.look), places.tell(), numbers, np.array(clear), people.kept()))
 
-    def _earlier(self, group: Group, carried: Carried | None, stack: ExitStack) -> list[tuple[dict[int, MotionFrame], bool]]:
+    def _earlier(self, group: Group, people: PeopleState, carried: Carried | None,
+                 stack: ExitStack) -> list[tuple[dict[int, MotionFrame], bool]]:
         """The frames of each frame set before a checkpoint, by person, and whether cameras could be judged in it."""
         if carried is None:
             return []
         found = [(dict[int, MotionFrame](), is_clear) for is_clear in carried.clear.tolist()]
-        for member, number in zip(group.members, carried.numbers):
+        for person, number in zip(people.people, carried.numbers):
             if number:
-                frames = self._open(member, stack, number)
-                for (people, _), frame in zip(found[len(found) - number :], frames, strict=True):
-                    people[member.number] = frame
+                frames = self._open(person, group.subject(person.measured), stack, number)
+                for (of_set, _), frame in zip(found[len(found) - number :], frames, strict=True):
+                    of_set[person.number] = frame
         return found
 
-    @staticmethod
-    def _doubted(frame: MotionFrame) -> MotionFrame:
-        """The frame of a person who may face the other way, or be another one: nothing of it is `tracked`."""
-        limbs = None if frame.limb_status is None else ["uncertain" if status == "tracked" else status for status in frame.limb_status]
-        return frame._replace(status="uncertain" if frame.status == "tracked" else frame.status, limb_status=limbs)
-
-    def _write(self, group: Group, now: FrameSet, stack: ExitStack, places: BinaryIO) -> dict[int, MotionFrame]:
+    def _write(self, group: Group, people: PeopleState, stack: ExitStack, places: BinaryIO) -> dict[int, MotionFrame]:
         """Write a frame of each person found so far."""
         found = dict[int, MotionFrame]()
-        for member in group.members:
-            if member.state is None and member.number not in self.writers:
+        for person in people.people:
+            number, frame = person.number, person.frame
+            if frame is None or (person.state is None and number not in self.writers):
                 continue
-            if member.state is None or member.share is None:
-                frame, member.before = MotionFrame(now.time, "absent"), None
-            else:
-                frame, member.before = motion_frame(member.subject, now.time, member.state, member.observation, member.before)
-                doubted = group.identity.is_doubted(member.number)
-                if not member.facing.is_known:
-                    would_be = self._doubted(frame) if doubted else frame
-                    member.facing.doubted[frame.time] = Doubted(would_be.status, tuple(would_be.limb_status or ()))
-                if doubted or not member.is_front_sure:
-                    frame = self._doubted(frame)
-            self._writer(member, stack).write(frame)
-            if member.measured_at == now.time:
-                self._write_person(member)
-            here = frame.status not in ("absent", "lost") and member.state is not None
-            place = place_of(member.subject.body, member.state) if here and member.state is not None else np.full(2, np.nan)
-            write_place(places, now.time, member.number, frame.status, place)
-            found[member.number] = frame
+            subject = group.subject(person.measured)
+            if number not in self.writers:
+                self._open(person, subject, stack)
+            self.writers[number].write(frame)
+            if person.measured_at == frame.time:
+                self._write_person(number, subject)
+            place = np.full(2, np.nan) if person.state is None or frame.status in BLANK else group.place(person)
+            write_place(places, frame.time, number, frame.status, place)
+            found[number] = frame
         places.flush()
         return found
 
-    def _writer(self, member: Member, stack: ExitStack) -> RunWriter:
-        """The writer of a person's run, opened when they are first seen."""
-        if member.number not in self.writers:
-            self._open(member, stack)
-        return self.writers[member.number]
-
-    def _open(self, member: Member, stack: ExitStack, number: int = 0) -> list[MotionFrame]:
+    def _open(self, person: PersonState, subject: MultiviewSubject, stack: ExitStack, number: int = 0) -> list[MotionFrame]:
         """Open the writer of a person's run; returns the earlier run's frames, of this `number`, after which it goes on."""
-        subject, folder = member.subject, person_folder(self.folder, member.number)
-        body, info = subject.body, self.info | {"person": member.number}
+        body, info = subject.body, self.info | {"person": person.number}
         resume = Resuming(bool(number), NO_INPUTS)  # the group's writer watches the inputs
-        writer = RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, resume, of_group=True)
-        self.writers[member.number] = stack.enter_context(writer)
+        writer = RunWriter(person_folder(self.folder, person.number), body.name, body.skeleton.dof_names, joint_names(body), info, resume,
+                           of_group=True)
+        self.writers[person.number] = stack.enter_context(writer)
         frames = writer.go_on(number) if number else []
         writer.begin()
-        self._write_person(member)
+        self._write_person(person.number, subject)
         return frames
 
-    def _write_person(self, member: Member) -> None:
+    def _write_person(self, number: int, subject: MultiviewSubject) -> None:
         """Write the person's sizes, and what the look found of them."""
-        subject = member.subject
-        look = self.survey.look_with(subject.summary, subject.doubts)
-        write_beside(person_folder(self.folder, member.number), look, self.rig, subject.person)
+        write_beside(person_folder(self.folder, number), self.survey.look_with(subject.summary, subject.doubts), self.rig, subject.person)
 
 
 def _together(drawn: Sequence[tuple[Bits, ...]]) -> tuple[Bits, ...]:

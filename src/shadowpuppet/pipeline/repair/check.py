@@ -14,7 +14,7 @@ from shadowpuppet.calibration.agreement import MAX_DISAGREEMENT, Agreement, comp
 from shadowpuppet.calibration.clock_offset import ClockOffsets
 from shadowpuppet.calibration.rotation_error import RotationError, estimate_place_error, estimate_rotation_error
 from shadowpuppet.calibration.silhouettes import Row, silhouettes_of
-from shadowpuppet.calibration.time_offset import TimeOffsets, time_offsets
+from shadowpuppet.calibration.time_offset import TimeOffsets, certain_offsets, delays_in_words, time_offsets
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
 from shadowpuppet.pipeline.findings.film import brief_length
 from shadowpuppet.pipeline.footage import Footage, take_sample
@@ -30,9 +30,8 @@ MAX_SET_RATE = 31.0
 """Greatest rate of the sets compared, 1/s; a higher one adds nothing."""
 SETS_COMPARED = 12
 """Number of sets, spread over all, in which places are compared."""
-MIN_OFFSET, MIN_OFFSET_MISPLACED, SPREAD_FACTOR = 0.5, 1.5, 1.5
-"""Least offset, in sets, of a film that is late; the same for a camera that disagrees about places, so that its time is less certain;
-least ratio of the offset to the half-width of its 90 % interval."""
+SAME_PIXELS = 0.1
+"""Mean disagreement, pixels, by which films put in step may be worse: silhouettes of a person who hardly moves are as much alike."""
 SLIGHT_DISAGREEMENT = 0.004
 """Disagreement, over the picture's longer side, above which the worst camera is tested for a rotation (2.6 of 640 pixels)."""
 STANDOUT_FACTOR = 3.0
@@ -153,15 +152,15 @@ class _Judgement(NamedTuple):
     shifts: list[float]
     """Certain time offset of each film, in sets; 0 if it is uncertain."""
 
-    def left(self) -> float:
-        """Mean disagreement of the cameras, pixels, after the estimated rotations are undone."""
-        known = [self.rotations[name].apart if name in self.rotations else apart
-                 for name, apart in zip(self.agreement.names, self.agreement.apart) if apart is not None]
-        return float(np.mean(known)) if known else np.inf
+    def left(self) -> list[float]:
+        """Disagreements of the cameras, pixels, after the estimated rotations are undone; infinite if none is known."""
+        return [self.rotations[name].apart if name in self.rotations else apart
+                for name, apart in zip(self.agreement.names, self.agreement.apart) if apart is not None] or [np.inf]
 
 
 def _judged(rig: Rig, rows: Sequence[Row]) -> _Judgement:
-    """Compare places, then times, then places again with the films aligned; the aligned result is used if it leaves less disagreement."""
+    """Compare places, then times, then places again with the films aligned; the aligned result is used if it leaves no more disagreement,
+    and most cameras fit then: where they do not, a delay is no more than noise."""
     still = [0.0] * len(rig.cameras)
     chosen = aligned_sets(rows, still)
     found = compare_cameras(rig.cameras, chosen)
@@ -172,7 +171,8 @@ def _judged(rig: Rig, rows: Sequence[Row]) -> _Judgement:
         return first._replace(rotations=first.rotations | _pushed(rig, first, chosen))
     aligned = aligned_sets(rows, first.shifts)
     second = _with_times(rig, rows, compare_cameras(rig.cameras, aligned, remedies=False), aligned)
-    return second if second.left() < first.left() else first._replace(shifts=still)  # not a time offset
+    is_mended = np.median(second.left()) <= found.limit and np.mean(second.left()) <= np.mean(first.left()) + SAME_PIXELS
+    return second if is_mended else first._replace(shifts=still)
 
 
 def _with_times(rig: Rig, rows: Sequence[Row], found: Agreement, chosen: Sequence[Row]) -> _Judgement:
@@ -180,7 +180,7 @@ def _with_times(rig: Rig, rows: Sequence[Row], found: Agreement, chosen: Sequenc
     rotations = _rotations(rig, found, chosen)
     cameras = [rotations[camera.name].turn.of(camera) if camera.name in rotations else camera for camera in rig.cameras]
     offsets = time_offsets(cameras, rows)
-    return _Judgement(found, rotations, offsets, _certain(offsets, found))
+    return _Judgement(found, rotations, offsets, certain_offsets(offsets, found.wrong))
 
 
 def aligned_sets(rows: Sequence[Row], shifts: Sequence[float], count: int = SETS_COMPARED) -> list[Row]:
@@ -189,13 +189,6 @@ def aligned_sets(rows: Sequence[Row], shifts: Sequence[float], count: int = SETS
     first, last = max(0, -min(steps)), F - 1 - max(0, *steps)
     chosen = np.unique(np.linspace(first, max(first, last), count).astype(int))
     return [[rows[f + step][k] if f + step < F else None for k, step in enumerate(steps)] for f in chosen.tolist()]
-
-
-def _certain(offsets: TimeOffsets, found: Agreement) -> list[float]:
-    """Certain time offsets of the films, in sets; 0 for uncertain ones."""
-    limits = [max(MIN_OFFSET_MISPLACED if name in found.wrong else MIN_OFFSET, SPREAD_FACTOR * (spread or 0.0))
-              for name, spread in zip(offsets.names, offsets.spread)]
-    return [late if late is not None and abs(late) > limit else 0.0 for late, limit in zip(offsets.frames, limits)]
 
 
 def _rotations(rig: Rig, found: Agreement, rows: Sequence[Row]) -> dict[str, RotationFix]:
@@ -261,8 +254,8 @@ def doubts_of(check: CalibrationCheck) -> list[str]:
     """What is wrong, with its remedy, a sentence each."""
     said, found = list[str](), check.agreement
     if check.late and check.lateness is not None:
-        frames = {name: value for name, value in zip(check.lateness.names, check.lateness.frames) if name in check.late}
-        text = ", ".join(f"{name} {abs(value or 0):.1f} frames {'late' if (value or 0) > 0 else 'early'}" for name, value in frames.items())
+        text = delays_in_words({name: value or 0.0 for name, value in zip(check.lateness.names, check.lateness.frames)
+                                if name in check.late})
         start = ", ".join(f"{name} = {value:.4g}" for name, value in check.starts.items())
         said.append(f"the films do not begin together ({text}): put into [start] of recording.toml: {start}")
     if found.hopeless and found.remedy is not None:

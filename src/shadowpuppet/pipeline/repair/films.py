@@ -8,13 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.calibration.clock_offset import ClockOffsets
-from shadowpuppet.calibration.time_offset import TimeOffsets
+from shadowpuppet.calibration.time_offset import MIN_OFFSET, SPREAD_FACTOR, TimeOffsets
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.repair.check import (
-    MIN_OFFSET,
-    SPREAD_FACTOR,
+    SAME_PIXELS,
     CalibrationCheck,
     SilhouetteSets,
     doubts_of,
@@ -26,8 +25,6 @@ from shadowpuppet.pipeline.rig import Rig
 
 DISAGREE = {"sound": "sound and silhouettes disagree about the films' delays: does the sound of a film lag behind its pictures?",
             "timecode": "timecodes and silhouettes disagree about the films' delays: were the cameras' clocks set together?"}
-SAME_PIXELS = 0.1
-"""Mean disagreement by which films put in step by their clocks may be worse if the person hardly moves, so that silhouettes cannot tell."""
 
 
 def check_calibration(rig: Rig, options: Options, listener: Listener | None = None) -> CalibrationCheck:
@@ -99,6 +96,6 @@ def _by_clock(rig: Rig, moved: Rig, check: CalibrationCheck, clock: ClockOffsets
     found = TimeOffsets(names=names, frames=frames, spread=spread,
                         pairs=tuple((None,) * len(names) for _ in names) if check.lateness is None else check.lateness.pairs)
     check = replace(check, lateness=found, clock=clock, by_clock=True,
-                    late=tuple(name for name, value in zip(names, frames) if abs(value) > MIN_OFFSET),
+                    late=tuple(name for name, value, width in zip(names, frames, spread) if abs(value) > max(MIN_OFFSET, width or 0.0)),
                     starts={name: round(start - least, 4) for name, start in starts.items() if start - least > 1e-4})
     return replace(check, doubts=tuple(doubts_of(check)))

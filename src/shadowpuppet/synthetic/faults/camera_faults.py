@@ -13,16 +13,16 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.faults.fault import Fault
-from shadowpuppet.synthetic.faults.kinds import KINDS, Moment
+from shadowpuppet.synthetic.faults.kinds import KINDS, LightMoment
 from shadowpuppet.synthetic.viewpoint import sees_everywhere
 
 MARGIN_STEP = 16
 """Margins are multiples of this, so that grids that divide the picture fall on the same pixels."""
-Item = TypeVar("Item")
+Along = TypeVar("Along")
 
 
-class Placed(NamedTuple):
-    """A fault with what was drawn for one camera."""
+class DrawnFault(NamedTuple):
+    """A fault with its random numbers for one camera."""
 
     fault: Fault
     chance: Array
@@ -38,7 +38,7 @@ class CameraFaults:
         """count: frames of the world, at `rate` frames per second; hz: frequency of flicker.
 
         Each fault has random numbers of its own: another fault before it does not change them. Raises `SettingsError` if a fault begins
-        after the film, if no frame is left of it, or if a displaced picture shows what is beyond the lens.
+        after the film, if no frame is left of it, or if a displaced picture reaches beyond the lens.
         """
         self.camera, self.rate, self.count, self.hz = camera, rate, count, hz
         self.last = (count - 1) / rate
@@ -46,7 +46,7 @@ class CameraFaults:
         for n, fault, _ in own:
             if fault.begin > self.last + 1e-9:
                 raise SettingsError(f"faults.{n}: begin: found {fault.begin:g} s, after the film's last frame at {self.last:g} s")
-        self._placed = [Placed(fault, one.random(4), n) for n, fault, one in own]
+        self._placed = [DrawnFault(fault, one.random(4), n) for n, fault, one in own]
         self.moves = self._moves(own)
         self.margin = self._margin()
         self._check_lens(own)
@@ -57,7 +57,7 @@ class CameraFaults:
         return np.array([fault.share(n / self.rate, self.last) for n in range(self.count)])
 
     def _moves(self, own: Sequence[tuple[int, Fault, np.random.Generator]]) -> Array:
-        """Displacement of what is in the picture by frame, of shape (T, 3): to the right and down in pixels, clockwise in radians."""
+        """Displacement of the picture's content by frame, of shape (T, 3): to the right and down in pixels, clockwise in radians."""
         moves = np.zeros((self.count, 3))
         for _, fault, rng in own:
             if (move := KINDS[fault.kind].displacement) is not None:
@@ -100,11 +100,11 @@ class CameraFaults:
         return replace(self.camera, size=(width + 2 * self.margin, height + 2 * self.margin), matrix=matrix)
 
     def cropped(self, picture: np.ndarray) -> np.ndarray:
-        """A picture (H, W, ...) of the wide camera without its margin: what the camera saw before it was moved."""
+        """A picture (H, W, ...) of the wide camera without its margin: the view before the camera was moved."""
         return picture[self.margin : len(picture) - self.margin, self.margin : picture.shape[1] - self.margin]
 
     def displaced(self, picture: np.ndarray, index: int) -> np.ndarray:
-        """What the moved camera sees in frame `index`, of a wide picture (H, W, 3) of light or a mask (H, W)."""
+        """The moved camera's part, in frame `index`, of a wide picture (H, W, 3) of light or a mask (H, W)."""
         import cv2
 
         if not self.margin:
@@ -120,14 +120,14 @@ class CameraFaults:
         return np.asarray(cv2.warpAffine(picture, np.column_stack([back, start]), self.camera.size, flags=how | cv2.WARP_INVERSE_MAP,
                                          borderMode=cv2.BORDER_REPLICATE))
 
-    def blurred(self, pictures: Iterator[tuple[Array, Item]]) -> Iterator[tuple[Array, Item]]:
+    def blurred(self, pictures: Iterator[tuple[Array, Along]]) -> Iterator[tuple[Array, Along]]:
         """Pictures (H, W, 3) of the whole film with motion blur, and what came with each."""
         blurs = [fault for fault, *_ in self._of("motion_blur")]
         spans = np.max([1 + self._shares(fault) * (fault.strength - 1) for fault in blurs] or [[1]], axis=0)
         return averaged(pictures, [round(span) for span in spans]) if blurs else pictures
 
-    def timed(self, frames: Iterator[Item]) -> Iterator[Item]:
-        """The world's frames as the film has them: some missing, repeated or late."""
+    def timed(self, frames: Iterator[Along]) -> Iterator[Along]:
+        """The world's frames in the film's order: some missing, repeated or late."""
         return frames if self.sources == list(range(self.count)) else rearranged(frames, self.sources)
 
     def lit(self, light: Array, index: int | None, seconds: float) -> Array:
@@ -135,7 +135,7 @@ class CameraFaults:
         for fault, chance, _ in self._placed:
             change, share = KINDS[fault.kind].light, self._share_at(fault, index)
             if change is not None and share:
-                light = change(light, fault.strength, Moment(share, seconds, self.hz, chance))
+                light = change(light, fault.strength, LightMoment(share, seconds, self.hz, chance))
         return light
 
     def noise(self, own: float, index: int | None) -> float:
@@ -159,16 +159,16 @@ class CameraFaults:
     def _share_at(self, fault: Fault, index: int | None) -> float:
         return float(fault.empty) if index is None else fault.share(index / self.rate, self.last)
 
-    def _of(self, kind: str) -> list[Placed]:
+    def _of(self, kind: str) -> list[DrawnFault]:
         return [one for one in self._placed if one.fault.kind == kind]
 
 
-def averaged(pictures: Iterable[tuple[Array, Item]], spans: Sequence[int]) -> Iterator[tuple[Array, Item]]:
+def averaged(pictures: Iterable[tuple[Array, Along]], spans: Sequence[int]) -> Iterator[tuple[Array, Along]]:
     """Each picture (H, W, 3) averaged over `spans` consecutive ones, half of them before it, and what came with it.
 
     Spans reach no farther than the first and the last picture; only those still needed are kept.
     """
-    kept, source, read = deque[tuple[Array, Item]](), iter(pictures), 0
+    kept, source, read = deque[tuple[Array, Along]](), iter(pictures), 0
     for index, span in enumerate(spans):
         first = max(index - span // 2, 0)
         after = min(index - span // 2 + span, len(spans))
@@ -185,10 +185,10 @@ def averaged(pictures: Iterable[tuple[Array, Item]], spans: Sequence[int]) -> It
             kept.popleft()
 
 
-def rearranged(frames: Iterable[Item], sources: Sequence[int]) -> Iterator[Item]:
+def rearranged(frames: Iterable[Along], sources: Sequence[int]) -> Iterator[Along]:
     """Frames in the order of `sources`, numbers of the given frames; only those still needed are kept."""
     last_use = {source: n for n, source in enumerate(sources)}
-    kept, given = dict[int, Item](), enumerate(frames)
+    kept, given = dict[int, Along](), enumerate(frames)
     for n, source in enumerate(sources):
         while source not in kept:
             number, frame = next(given)

@@ -10,10 +10,10 @@ from pydantic.dataclasses import dataclass
 
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.settings import STRICT
-from shadowpuppet.synthetic.faults.kinds import KINDS, FaultName, Kind
+from shadowpuppet.synthetic.faults.kinds import KINDS, FaultKind, FaultName
 from shadowpuppet.synthetic.viewpoint import Name
 
-Seconds = Annotated[float, Field(ge=0, le=36_000)]
+FaultSeconds = Annotated[float, Field(ge=0, le=36_000)]
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
@@ -24,9 +24,9 @@ class Fault:
     """Kind of fault."""
     amount: float | None = None
     """Strength, in the unit of the kind; by default a moderate one."""
-    begin: Seconds = 0.0
+    begin: FaultSeconds = 0.0
     """Second of the film at which it begins."""
-    end: Seconds | None = None
+    end: FaultSeconds | None = None
     """Second of the film at which it ends; by default it stays."""
     drift: bool = False
     """Whether it builds up evenly from `begin` to `end` (by default the film's end) and stays, rather than being there at once."""
@@ -35,12 +35,12 @@ class Fault:
     empty: bool = False
     """Whether the film of the empty scene has it as well, from its first to its last frame."""
     direction_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
-    """Direction in which a nudge moves what is in the picture, degrees: 0 to the right, 90 down."""
+    """Direction in which a nudge moves the picture's content, degrees: 0 to the right, 90 down."""
     roll_deg: Annotated[float, Field(ge=-45, le=45)] = 0.0
-    """Clockwise turn of what is in the picture after a nudge, or the greatest one of a shaking camera, degrees."""
+    """Clockwise turn of the picture's content after a nudge, or the greatest one of a shaking camera, degrees."""
 
     def __post_init__(self) -> None:
-        """Check what the kind allows."""
+        """Check the values against the kind."""
         known = KINDS[self.kind]
         self._check_amount(known)
         if self.end is not None and self.end <= self.begin:
@@ -58,7 +58,7 @@ class Fault:
             others = ", ".join(other for other, kind in KINDS.items() if allows[name](kind))
             raise ValueError(f"{name}: found {str(getattr(self, name)).lower()} for {self.kind}; only these have it: {others}")
 
-    def _check_amount(self, known: Kind) -> None:
+    def _check_amount(self, known: FaultKind) -> None:
         if self.amount is None:
             return
         if not known.unit:

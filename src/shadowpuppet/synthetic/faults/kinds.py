@@ -22,8 +22,8 @@ SHAKE_SECONDS = 0.12
 """Smoothness of a shaking tripod's movement: standard deviation of the Gaussian that filters white noise, seconds."""
 
 
-class Moment(NamedTuple):
-    """What a fault of light depends on, besides its amount."""
+class LightMoment(NamedTuple):
+    """Circumstances of a fault of light, besides its amount."""
 
     share: float
     """Share of the fault that is there, over 0 to 1: less than 1 while it builds up."""
@@ -38,23 +38,23 @@ class Moment(NamedTuple):
 # Faults of light: of a picture (H, W, 3), RGB, 0 to 1, an amount and a moment, a picture. Sensor noise comes after them, and clipping.
 
 
-def gain(light: Array, amount: float, now: Moment) -> Array:
+def gain(light: Array, amount: float, now: LightMoment) -> Array:
     """Exposure, times the amount."""
     return light * amount**now.share
 
 
-def white_balance(light: Array, amount: float, now: Moment) -> Array:
+def white_balance(light: Array, amount: float, now: LightMoment) -> Array:
     """Red times the amount, blue divided by it."""
     factor = amount**now.share
     return light * np.array([factor, 1.0, 1 / factor])
 
 
-def flicker(light: Array, amount: float, now: Moment) -> Array:
+def flicker(light: Array, amount: float, now: LightMoment) -> Array:
     """Brightness that swings by the amount, relative."""
     return light * (1 + amount * now.share * np.sin(2 * np.pi * now.hz * now.seconds))
 
 
-def lamp(light: Array, amount: float, now: Moment) -> Array:
+def lamp(light: Array, amount: float, now: LightMoment) -> Array:
     """A lamp that is switched, at the left or the right: the light there times the amount, less and less away from it."""
     height, width = light.shape[:2]
     centre = np.array([(0.15 if now.chance[0] < 0.5 else 0.85) * width, (0.2 + 0.4 * now.chance[1]) * height])
@@ -62,7 +62,7 @@ def lamp(light: Array, amount: float, now: Moment) -> Array:
     return light * (1 + (amount - 1) * now.share * np.exp(-(away**2) / 2))[..., None]
 
 
-def sun(light: Array, amount: float, now: Moment) -> Array:
+def sun(light: Array, amount: float, now: LightMoment) -> Array:
     """The sun through a window, at the left or the right: the light in an upright patch on the wall times the amount. With `drift` it comes
     within the first tenth of the time, and wanders inward."""
     height, width = light.shape[:2]
@@ -73,21 +73,21 @@ def sun(light: Array, amount: float, now: Moment) -> Array:
     return light * (1 + (amount - 1) * there)[..., None]
 
 
-def vignetting(light: Array, amount: float, now: Moment) -> Array:
+def vignetting(light: Array, amount: float, now: LightMoment) -> Array:
     """Light that falls off from the centre with the square of the distance; at the corners the amount is missing."""
     height, width = light.shape[:2]
     across, down = np.meshgrid(np.linspace(-1, 1, width) * width, np.linspace(-1, 1, height) * height)
     return light * (1 - amount * now.share * (across**2 + down**2) / (width**2 + height**2))[..., None]
 
 
-def defocus(light: Array, amount: float, now: Moment) -> Array:
+def defocus(light: Array, amount: float, now: LightMoment) -> Array:
     """Gaussian blur; the amount is its standard deviation, pixels."""
     import cv2
 
     return np.asarray(cv2.GaussianBlur(light, (0, 0), amount * now.share), float)
 
 
-def black(light: Array, _: float, now: Moment) -> Array:
+def black(light: Array, _: float, now: LightMoment) -> Array:
     """No light."""
     return light * (1 - now.share)
 
@@ -134,12 +134,12 @@ def late(sources: Sequence[int], first: int, last: int, amount: float, _: np.ran
     return [source if not first <= n < last else sources[max(n - round(amount), 0)] for n, source in enumerate(sources)]
 
 
-Light = Callable[[Array, float, Moment], Array]
+LightFault = Callable[[Array, float, LightMoment], Array]
 Displacement = Callable[[int, float, np.random.Generator], tuple[Array, Array]]
-Timing = Callable[[Sequence[int], int, int, float, np.random.Generator], list[int]]
+TimingFault = Callable[[Sequence[int], int, int, float, np.random.Generator], list[int]]
 
 
-class Kind(NamedTuple):
+class FaultKind(NamedTuple):
     """A kind of fault: its amount, and where it acts."""
 
     unit: str
@@ -147,9 +147,9 @@ class Kind(NamedTuple):
     default: float = 1.0
     least: float = 1.0
     most: float = 1.0
-    light: Light | None = None
+    light: LightFault | None = None
     displacement: Displacement | None = None
-    timing: Timing | None = None
+    timing: TimingFault | None = None
     whole: bool = False
     """Whether the amount is a whole number."""
     everywhere: bool = False
@@ -167,25 +167,25 @@ class Kind(NamedTuple):
 
 
 CRF, FRAMES_AVERAGED = "H.264's constant rate factor", "number of pictures averaged"
-KINDS: dict[str, Kind] = {
-    "gain": Kind("factor on the light", 1.3, 0.1, 10, light=gain),
-    "white_balance": Kind("factor on red and divisor of blue", 1.2, 0.3, 3, light=white_balance),
-    "flicker": Kind("relative amplitude", 0.05, 0, 0.5, light=flicker),
-    "lamp": Kind("factor on the light beside the lamp", 1.5, 0.1, 5, light=lamp),
-    "sun": Kind("factor on the light in a patch of sun", 1.3, 0.1, 5, light=sun),
-    "vignetting": Kind("share of light missing at the corners", 0.3, 0, 0.9, light=vignetting),
-    "defocus": Kind("standard deviation of the blur, pixels", 1.5, 0.3, 20, light=defocus),
-    "black": Kind("", light=black),
-    "motion_blur": Kind(FRAMES_AVERAGED, 2, 2, 30, whole=True),
-    "noise": Kind("standard deviation of further noise, grey levels at middle grey", 10, 0, 100),
-    "crf": Kind(CRF, 28, 0, 51, whole=True),
-    "nudge": Kind("pixels", 10, 0, 200, displacement=nudge),
-    "shake": Kind("greatest displacement, pixels", 3, 0, 100, displacement=shake),
-    "frozen": Kind("", timing=frozen),
-    "dropped": Kind("share of frames missing", 0.1, 0, 1, timing=dropped),
-    "repeated": Kind("times that each picture is shown", 2, 2, 1000, timing=repeated, whole=True),
-    "late": Kind("frames", 5, 1, 1000, timing=late, whole=True),
-    "absent": Kind("", everywhere=True),
+KINDS: dict[str, FaultKind] = {
+    "gain": FaultKind("factor on the light", 1.3, 0.1, 10, light=gain),
+    "white_balance": FaultKind("factor on red and divisor of blue", 1.2, 0.3, 3, light=white_balance),
+    "flicker": FaultKind("relative amplitude", 0.05, 0, 0.5, light=flicker),
+    "lamp": FaultKind("factor on the light beside the lamp", 1.5, 0.1, 5, light=lamp),
+    "sun": FaultKind("factor on the light in a patch of sun", 1.3, 0.1, 5, light=sun),
+    "vignetting": FaultKind("share of light missing at the corners", 0.3, 0, 0.9, light=vignetting),
+    "defocus": FaultKind("standard deviation of the blur, pixels", 1.5, 0.3, 20, light=defocus),
+    "black": FaultKind("", light=black),
+    "motion_blur": FaultKind(FRAMES_AVERAGED, 2, 2, 30, whole=True),
+    "noise": FaultKind("standard deviation of further noise, grey levels at middle grey", 10, 0, 100),
+    "crf": FaultKind(CRF, 28, 0, 51, whole=True),
+    "nudge": FaultKind("pixels", 10, 0, 200, displacement=nudge),
+    "shake": FaultKind("greatest displacement, pixels", 3, 0, 100, displacement=shake),
+    "frozen": FaultKind("", timing=frozen),
+    "dropped": FaultKind("share of frames missing", 0.1, 0, 1, timing=dropped),
+    "repeated": FaultKind("times that each picture is shown", 2, 2, 1000, timing=repeated, whole=True),
+    "late": FaultKind("frames", 5, 1, 1000, timing=late, whole=True),
+    "absent": FaultKind("", everywhere=True),
 }
-"""All kinds by name. Those without a function are `camera_faults.CameraFaults`' own: they change how pictures become a film, or who is in
-them."""
+"""All kinds by name. Those without a function are `camera_faults.CameraFaults`' own: they change how pictures become a film, or remove the
+person."""

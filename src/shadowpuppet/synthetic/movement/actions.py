@@ -9,7 +9,7 @@ import numpy as np
 from shadowpuppet.synthetic.movement.gait_cycle import Sole
 from shadowpuppet.synthetic.movement.gestures import Keys, Posture, band_noise, both, left, right, trunk
 from shadowpuppet.synthetic.movement.gestures import random as random_keys
-from shadowpuppet.synthetic.movement.keyframes import HALF_STANCE, Hop, KeyframeMotion, Step
+from shadowpuppet.synthetic.movement.keyframes import HALF_STANCE, FootStep, Hop, KeyframeMotion
 from shadowpuppet.synthetic.movement.resting import BACKWARD, kneeling_knee, seated_pelvis
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
@@ -22,14 +22,14 @@ def box(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMo
     begin, end = 0.9, seconds - 0.9
     stand: Posture = GUARD | trunk(turn=-22, spine_twist=-8, pelvis_bow=4, spine_bow=8, head_turn=24, head_nod=4)
     stand |= {"drop": 0.045, "right_heel": np.radians(12), "ahead": 0.03}
-    steps = [Step(0, 0.12, 0.36, 0.15, 0.24, -0.12), Step(1, 0.5, 0.36, -0.16, -0.18, -0.62)]
+    steps = [FootStep(0, 0.12, 0.36, 0.15, 0.24, -0.12), FootStep(1, 0.5, 0.36, -0.16, -0.18, -0.62)]
     keys: Keys = [(begin, stand)]
     t, shift = begin + 0.2, np.zeros(2)
     while t < end - 0.75:
         if rng.uniform() < 0.22 and t < end - 1.6:
             shift = np.clip(shift + rng.uniform(-0.12, 0.12, 2), -0.15, 0.15)
-            steps += [Step(0, t, 0.25, 0.15 + shift[0], 0.24 + shift[1], -0.12, 0.03)]
-            steps += [Step(1, t + 0.26, 0.25, -0.16 + shift[0], -0.18 + shift[1], -0.62, 0.03)]
+            steps += [FootStep(0, t, 0.25, 0.15 + shift[0], 0.24 + shift[1], -0.12, 0.03)]
+            steps += [FootStep(1, t + 0.26, 0.25, -0.16 + shift[0], -0.18 + shift[1], -0.62, 0.03)]
             t += 0.6
             keys.append((t, stand | {"aside": shift[0], "ahead": 0.03 + shift[1]}))
         name = str(rng.choice(["jab", "jab", "cross", "left_hook", "right_hook", "uppercut"]))
@@ -38,7 +38,7 @@ def box(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMo
         reach = rng.uniform(0.14, 0.2)
         keys += [(t + reach, strike), (t + 2.1 * reach, stand | {"aside": shift[0], "ahead": 0.03 + shift[1]})]
         t += 2.1 * reach + rng.uniform(0.08, 0.45)
-    steps += [Step(1, end, 0.36, -HALF_STANCE, 0.0), Step(0, end + 0.38, 0.36, HALF_STANCE, 0.0)]
+    steps += [FootStep(1, end, 0.36, -HALF_STANCE, 0.0), FootStep(0, end + 0.38, 0.36, HALF_STANCE, 0.0)]
     return KeyframeMotion(body, seconds, [*keys, (end, keys[-1][1])], steps, rounding=0.06)
 
 
@@ -85,12 +85,7 @@ def sit(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMo
     """Sitting down on an invisible seat, the hands on the thighs, and standing up again."""
     lean = both(front=22, side=10, elbow=45, curl=15, supination=-10) | trunk(pelvis_bow=40, spine_bow=16, head_nod=-14)
     seat = both(front=20, side=10, elbow=62, curl=15, supination=-20) | trunk(pelvis_bow=-4, spine_bow=8)
-    deep = rng.uniform(0.40, 0.46)
-    low: Posture = {"drop": deep, "ahead": -0.42}
-    half: Posture = {"drop": 0.6 * deep, "ahead": -0.30}
-    pace = min(seconds / 4.0, 1.0)
-    return KeyframeMotion(body, seconds, [(1.0 * pace, lean | half), (1.5 * pace, seat | low), (seconds - 1.5 * pace, seat | low),
-                               (seconds - 1.0 * pace, lean | half)])  # fmt: skip
+    return _seated(body, seconds, lean, seat | {"drop": rng.uniform(0.40, 0.46), "ahead": -0.42})
 
 
 def sit_down(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
@@ -99,11 +94,13 @@ def sit_down(body: Mannequin, seconds: float, rng: np.random.Generator) -> Keyfr
     seat = both(front=rng.uniform(18, 24), side=11, roll=-30, elbow=52, supination=-57, curl=20) | trunk(pelvis_bow=-4, spine_bow=8)
     leg = body.length("thigh") + body.length("shank")
     deep = (leg + Sole.of(body).ankle + 0.02 - seated_pelvis(body)) / leg
-    low: Posture = {"drop": deep, "ahead": -BACKWARD}
-    half: Posture = {"drop": 0.6 * deep, "ahead": -0.30}
-    pace = min(seconds / 4.0, 1.0)
-    return KeyframeMotion(body, seconds, [(1.0 * pace, lean | half), (1.5 * pace, seat | low), (seconds - 1.5 * pace, seat | low),
-                               (seconds - 1.0 * pace, lean | half)])  # fmt: skip
+    return _seated(body, seconds, lean, seat | {"drop": deep, "ahead": -BACKWARD})
+
+
+def _seated(body: Mannequin, seconds: float, lean: Posture, low: Posture) -> KeyframeMotion:
+    """Down to the posture `low` and up again, leaning on both ways."""
+    half, pace = lean | {"drop": 0.6 * low["drop"], "ahead": -0.30}, min(seconds / 4.0, 1.0)
+    return KeyframeMotion(body, seconds, [(1.0 * pace, half), (1.5 * pace, low), (seconds - 1.5 * pace, low), (seconds - 1.0 * pace, half)])
 
 
 def kneel(body: Mannequin, seconds: float, rng: np.random.Generator) -> KeyframeMotion:
@@ -132,7 +129,7 @@ def march(body: Mannequin, seconds: float, rng: np.random.Generator) -> Keyframe
     for n in range(int((seconds - 0.8) / (period / 2))):
         foot, begin = n % 2, 0.35 + n * period / 2
         sign = 1 - 2 * foot
-        steps.append(Step(foot, begin, 0.46 * period, sign * HALF_STANCE, 0.0, 0.0, high))
+        steps.append(FootStep(foot, begin, 0.46 * period, sign * HALF_STANCE, 0.0, 0.0, high))
         fore, back = (right, left) if foot == 0 else (left, right)
         swing = fore(front=30, elbow=62, side=9) | back(front=-16, elbow=30, side=9)
         keys.append((begin + 0.23 * period, swing | trunk(spine_twist=5 * sign, pelvis_side=-3 * sign, spine_side=3 * sign)
@@ -168,7 +165,7 @@ def turn_around(body: Mannequin, seconds: float, rng: np.random.Generator) -> Ke
         to, sign = whole * min(n + 1, count) / count, 1 - 2 * foot
         aside, ahead = HALF_STANCE * sign * np.cos(to), -HALF_STANCE * sign * np.sin(to)
         begin = 0.25 + n * (seconds - 0.8) / (count + 1)
-        steps.append(Step(foot, begin, 0.75 * each, aside, ahead, to, 0.05))
+        steps.append(FootStep(foot, begin, 0.75 * each, aside, ahead, to, 0.05))
         keys.append((begin + 0.5 * each, {"turn": to - 0.3 * whole / count, "head_turn": 0.15 * np.sign(whole)}))
     return KeyframeMotion(body, seconds, keys, steps)
 

@@ -14,7 +14,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.movement.gait_cycle import GRAVITY, JOGGING, WALKING, GaitCycle, smoothstep, stride_length
 from shadowpuppet.synthetic.movement.gestures import STANDING, band_noise
 from shadowpuppet.synthetic.movement.paths import Path, PathName
-from shadowpuppet.synthetic.person.kinematics import CHANNELS, SIDES, TOE_OUT, Stance, rotations
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, SIDES, TOE_OUT, LegPlacement, rotations
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 CLOCK_STEP = 0.002
@@ -41,7 +41,7 @@ class Footprints(NamedTuple):
     """Size of the following step, 0 (none) to 1 (full)."""
 
 
-class Walk:
+class PathWalk:
     """A walk or jog along a path, which begins and ends in standing."""
 
     def __init__(self, body: Mannequin, seconds: float, rng: np.random.Generator, jogging: bool = False, speed: float | None = None,
@@ -93,7 +93,7 @@ class Walk:
         size = np.minimum(np.hypot(np.diff(along, append=along[-1]), np.diff(aside, append=aside[-1])) / (0.5 * self.cycle.stride), 1)
         return Footprints(int(strides[0]), along, aside, size**0.7)
 
-    def at(self, t: Array) -> tuple[Array, Stance]:
+    def at(self, t: Array) -> tuple[Array, LegPlacement]:
         """Postures (T, `CHANNELS`) and stance at times `t` (T,), s, from the origin facing -Y."""
         phase, gone, fully, lean = (np.interp(t, self.ticks, values) for values in (self.phase, self.gone, self.fully, self.lean))
         feet = [self._foot(n, phase - 0.5 * n) for n in (0, 1)]
@@ -112,7 +112,7 @@ class Walk:
         postures[:, CHANNELS.index("turn")] = heading
         postures[:, CHANNELS.index("pelvis_side")] += lean
         postures[:, CHANNELS.index("head_tilt")] -= 0.6 * lean
-        return postures, Stance(pelvis - shift, ankles - np.reshape(shift, (-1, 1, 3)), frames, toes, ahead)
+        return postures, LegPlacement(pelvis - shift, ankles - np.reshape(shift, (-1, 1, 3)), frames, toes, ahead)
 
     def _foot(self, side: int, phase: Array) -> tuple[Array, Array, Array]:
         """Ankle (T, 3), frame of the foot (T, 3, 3) and bend of its toes (T,) at phases of its leg."""

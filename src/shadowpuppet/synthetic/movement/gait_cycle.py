@@ -52,7 +52,7 @@ class Sole(NamedTuple):
         return lever - lever * c - self.ankle * s, -lever * s + self.ankle * c
 
 
-class Gait(NamedTuple):
+class GaitCurves(NamedTuple):
     """A gait as published joint angles over the cycle."""
 
     carries: float
@@ -73,7 +73,7 @@ class Gait(NamedTuple):
     """Forward rotation of the pelvis on that side, degrees."""
 
 
-WALKING = Gait(
+WALKING = GaitCurves(
     0.62,
     0.022,
     0.3,
@@ -83,7 +83,7 @@ WALKING = Gait(
     lambda p: curve(WALK["obliquity"], p),
     lambda p: curve(WALK["rotation"], p),
 )
-JOGGING = Gait(
+JOGGING = GaitCurves(
     0.38,
     0.045,
     6.0,
@@ -112,7 +112,7 @@ def stride_length(speed: float, leg: float, jogging: bool) -> float:
 class GaitCycle:
     """A gait of a body at a speed (m/s)."""
 
-    def __init__(self, body: Mannequin, gait: Gait, speed: float, stride: float) -> None:
+    def __init__(self, body: Mannequin, gait: GaitCurves, speed: float, stride: float) -> None:
         """stride: its length, metres."""
         self.body, self.gait, self.speed, self.stride = body, gait, speed, stride
         self.sole = Sole.of(body)
@@ -140,7 +140,7 @@ class GaitCycle:
         return np.where(phase % 1 > self.gait.carries, self._progress(np.maximum(phase % 1, self.gait.carries)), 0.0)
 
     def lift(self, phase: Array) -> Array:
-        """Lift of the foot beyond that of its pitch, metres."""
+        """Lift of the foot beyond the lift by its pitch, metres."""
         return np.where(phase % 1 > self.gait.carries, self._lift(np.maximum(phase % 1, self.gait.carries)), 0.0)
 
     def _angles(self, phase: Array, amplitude: float) -> tuple[Array, Array, Array]:

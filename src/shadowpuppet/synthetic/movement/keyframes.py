@@ -14,7 +14,7 @@ import numpy as np
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.movement.gait_cycle import GRAVITY, Sole, smoothstep
 from shadowpuppet.synthetic.movement.gestures import Keys, interpolate_keys, time_average
-from shadowpuppet.synthetic.person.kinematics import CHANNELS, TOE_OUT, Stance, rotations
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, TOE_OUT, LegPlacement, rotations
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 HALF_STANCE = 0.13
@@ -24,7 +24,7 @@ GROUND_CHANNELS = ("drop", "aside", "ahead", "left_heel", "right_heel")
 heels, rad. A leg that would not reach its foot lowers the pelvis further."""
 
 
-class Step(NamedTuple):
+class FootStep(NamedTuple):
     """A step of one foot."""
 
     foot: int
@@ -55,7 +55,7 @@ class Hop(NamedTuple):
 class KeyframeMotion:
     """A motion through key postures, with steps and hops of the feet."""
 
-    def __init__(self, body: Mannequin, seconds: float, keys: Keys, steps: Sequence[Step] = (), hops: Sequence[Hop] = (),
+    def __init__(self, body: Mannequin, seconds: float, keys: Keys, steps: Sequence[FootStep] = (), hops: Sequence[Hop] = (),
                  rounding: float = 0.16) -> None:
         """keys: values of `CHANNELS` and `GROUND_CHANNELS` at times from 0 to `seconds`; channels not named are as in standing.
 
@@ -69,7 +69,7 @@ class KeyframeMotion:
         self.keys: Keys = [(-1.0, {}), (0.0, {}), *keys, (seconds, last), (seconds + 1.0, last)]
         self.steps = tuple(tuple(sorted((s for s in steps if s.foot == n), key=lambda s: s.begin)) for n in (0, 1))
 
-    def at(self, t: Array) -> tuple[Array, Stance]:
+    def at(self, t: Array) -> tuple[Array, LegPlacement]:
         """Postures (T, `CHANNELS`) and stance at times `t` (T,), s."""
         values = interpolate_keys(self.keys, np.clip(t, 0, self.seconds), (*CHANNELS, *GROUND_CHANNELS), self.rounding)
         postures, (drop, aside, ahead, *heels) = values[:, : len(CHANNELS)], values[:, len(CHANNELS) :].T
@@ -81,7 +81,7 @@ class KeyframeMotion:
         pelvis = np.column_stack([self.leg * aside, -self.leg * ahead, top - self.leg * drop])
         turn = postures[:, CHANNELS.index("turn")]
         looks = looks + np.stack([np.sin(turn), -np.cos(turn), 0 * turn], -1)[:, None]
-        return postures, Stance(pelvis, ankles, frames, toes, looks)
+        return postures, LegPlacement(pelvis, ankles, frames, toes, looks)
 
     def _flight(self, t: Array) -> Array:
         """Height of both feet in hops at times `t` (T,), metres, of shape (T,)."""
@@ -106,7 +106,7 @@ class KeyframeMotion:
         return ankle, frame, np.clip(-pitch, 0, 0.9), np.column_stack([heading, 0 * turn])
 
 
-def _last(steps: Sequence[Step], what: str) -> float:
+def _last(steps: Sequence[FootStep], what: str) -> float:
     """Final shift of the pelvis, leg lengths, midway between the feet; what: "aside" or "ahead"."""
     places = [(HALF_STANCE if n == 0 else -HALF_STANCE) if what == "aside" else 0.0 for n in (0, 1)]
     for step in sorted(steps, key=lambda s: s.begin):

@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shadowpuppet.errors import SettingsError
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, shortest_rotation
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.synthetic.person.kinematics import SIDES, Figure, assemble_figure, fingers, rotations
+from shadowpuppet.synthetic.person.kinematics import SEGMENTS, SIDES, Assembly, PosedBody, rotations
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 if TYPE_CHECKING:
     from shadowpuppet.io.motion.amc import Capture
     from shadowpuppet.synthetic.movement.script import Gesture
 
-Points = dict[str, Array]
+JointPlaces = dict[str, Array]
 
 
-def animate_mocap(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: float = 0.0) -> Figure:
+def animate_mocap(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: float = 0.0) -> PosedBody:
     """The figure of `body` at times `t` (T,), s, moving as in the file of `gestures`; it begins facing -Y rotated by `turn`.
 
     The middle of the area it covers lies at the origin. Raises `FormatError` if the file cannot be used.
@@ -38,11 +38,11 @@ def animate_mocap(body: Mannequin, gestures: Sequence[Gesture], t: Array, turn: 
     R = rotations(*np.zeros((2, 1)), np.array([heading]))[0]
     joints, origin = figure.joints @ R.T, figure.origin @ R.T
     middle = np.append((joints[:, 0, :2].max(0) + joints[:, 0, :2].min(0)) / 2, 0.0)
-    return Figure(joints - middle, R @ figure.rotation, origin - middle, figure.curl)
+    return PosedBody(joints - middle, R @ figure.rotation, origin - middle, figure.curl)
 
 
 def mocap_seconds(gestures: Sequence[Gesture]) -> float:
-    """Length of the motion, seconds: that of the gesture, at most the rest of its file."""
+    """Length of the motion, seconds: the gesture's, at most the rest of its file."""
     gesture, capture = _one(gestures)
     there = (len(capture.root) - 1) / gesture.file_rate - gesture.start
     if there <= 0:
@@ -68,40 +68,31 @@ def _at(table: JointTable, t: Array) -> JointTable:
     return JointTable(np.arange(len(t), dtype=float), table.names, CubicSpline(table.times, table.positions)(t))
 
 
-def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> Figure:
+def retarget(body: Mannequin, table: JointTable, rest: JointTable) -> PosedBody:
     """The figure of `body` in the postures of `table`, one per row; rest: one row, the same skeleton upright, arms level, facing -Y.
 
     Both tables have the joints of `io.motion.amc.ENDS`, `pelvis` and `face`. The pelvis follows the measured one, scaled by the length of
     the legs; the lowest soles are brought to the floor.
     """
-    p: Points = dict(zip(table.names, table.positions.swapaxes(0, 1)))
-    calm: Points = dict(zip(rest.names, rest.positions.swapaxes(0, 1)))
-    bones = body.rest()
-    joint: Points = {}
-    frame: dict[str, tuple[Array, Array]] = {}
+    p: JointPlaces = dict(zip(table.names, table.positions.swapaxes(0, 1)))
+    calm: JointPlaces = dict(zip(rest.names, rest.positions.swapaxes(0, 1)))
+    parts = Assembly(body.rest())
     legs = _length(calm, "hip", "knee") + _length(calm, "knee", "ankle")
-    joint["pelvis"] = p["pelvis"] * (body.length("thigh") + body.length("shank")) / legs
-    trunk = {name: _frame(p, *axes) @ _frame(calm, *axes).swapaxes(1, 2) for name, axes in TRUNK_AXES.items()}
-    pelvis, thorax, head = trunk["pelvis"], trunk["thorax"], trunk["head"]
-    abdomen, neck = _between(pelvis, thorax), _between(thorax, head)
-    lumbar = joint["pelvis"] + pelvis @ (bones["lumbar"] - bones["pelvis"])
-    thoracic = lumbar + abdomen @ (bones["thoracic"] - bones["lumbar"])
-    joint["neck"] = thoracic + thorax @ (bones["neck"] - bones["thoracic"])
-    joint["head"] = joint["neck"] + neck @ (bones["head"] - bones["neck"])
-    frame |= {"pelvis": (pelvis, joint["pelvis"]), "abdomen": (abdomen, lumbar), "thorax": (thorax, thoracic)}
-    frame |= {"neck": (neck, joint["neck"]), "head": (head, joint["head"])}
+    centre = p["pelvis"] * (body.length("thigh") + body.length("shank")) / legs
+    pelvis, thorax, head = (_frame(p, *axes) @ _frame(calm, *axes).swapaxes(1, 2) for axes in TRUNK_AXES)
+    parts.add_trunk(centre, pelvis, _between(pelvis, thorax), thorax, _between(thorax, head), head)
     for side in SIDES:
-        _arm(bones, p, calm, side, thorax, thoracic, joint, frame)
-        _leg(body, bones, p, calm, side, pelvis, joint, frame)
-    return _on_the_floor(body, assemble_figure(joint, frame, np.full((len(table.times), 2), 0.35)))
+        _add_arm(parts, p, calm, side)
+        _add_leg(parts, body, p, calm, side)
+    return _on_the_floor(body, parts.figure(np.full((len(table.times), 2), 0.35)))
 
 
-TRUNK_AXES = {"pelvis": ("pelvis", "lumbar", "right_hip", "left_hip"), "thorax": ("lumbar", "neck", "right_shoulder", "left_shoulder"),
-              "head": ("head", "crown", "crown", "face")}
-"""Axes of the trunk's segments: up from the first joint to the second; left or ahead from the third to the fourth."""
+TRUNK_AXES = (("pelvis", "lumbar", "right_hip", "left_hip"), ("lumbar", "neck", "right_shoulder", "left_shoulder"),
+              ("head", "crown", "crown", "face"))
+"""Axes of pelvis, thorax and head: up from the first joint to the second; left or ahead from the third to the fourth."""
 
 
-def _frame(p: Points, low: str, high: str, start: str, end: str) -> Array:
+def _frame(p: JointPlaces, low: str, high: str, start: str, end: str) -> Array:
     """Frames (T, 3, 3) with z from `low` to `high` and x as near as possible to the direction from `start` to `end`."""
     z = _unit(p[high] - p[low])
     x = p[end] - p[start]
@@ -109,62 +100,53 @@ def _frame(p: Points, low: str, high: str, start: str, end: str) -> Array:
     return np.stack([x, np.cross(z, x), z], -1)
 
 
-def _arm(bones: Points, p: Points, calm: Points, side: str, thorax: Array, thoracic: Array, joint: Points, frame: dict) -> None:
-    """Add clavicle, upper arm, forearm, hand and fingers of one side to `joint` and `frame`."""
-    sign = 1.0 if side == "left" else -1.0
+def _add_arm(parts: Assembly, p: JointPlaces, calm: JointPlaces, side: str) -> None:
+    """Add clavicle, upper arm, forearm, hand and fingers of one side."""
+    sign, thorax = 1.0 if side == "left" else -1.0, parts.frame["thorax"][0]
     now = _unit(np.einsum("tji,tj->ti", thorax, p[f"{side}_shoulder"] - p["neck"]))
-    clavicle = thorax @ _swing(_unit(calm[f"{side}_shoulder"] - calm["neck"]), now)
+    clavicle = thorax @ shortest_rotation(_unit(calm[f"{side}_shoulder"] - calm["neck"]), now, 1e-6)
     upper, fore = (_unit(p[f"{side}_{b}"] - p[f"{side}_{a}"]) for a, b in (("shoulder", "elbow"), ("elbow", "wrist")))
     hinge = _steady_normals(-sign * np.cross(upper, fore), thorax @ np.array([sign, 0, 0.3]))
     upper_arm, bare = (_along_x(sign * axis, hinge) for axis in (upper, fore))
     hand_axis = _unit(p[f"{side}_hand"] - p[f"{side}_wrist"])
     thumb = p[f"{side}_thumb"] - p[f"{side}_wrist"]
     hand = _along_x(sign * hand_axis, np.cross(sign * hand_axis, -thumb))
-    forearm = _between(bare, _swing(hand[..., 0], bare[..., 0]) @ hand)  # half of the hand's axial rotation
-    at = {name: bones[f"{side}_{name}"] for name in ("clavicle", "shoulder", "elbow", "wrist", "hand")}
-    sternum = thoracic + thorax @ (at["clavicle"] - bones["thoracic"])
-    shoulder = sternum + clavicle @ (at["shoulder"] - at["clavicle"])
-    elbow = shoulder + upper_arm @ (at["elbow"] - at["shoulder"])
-    wrist = elbow + bare @ (at["wrist"] - at["elbow"])
-    joint |= {f"{side}_shoulder": shoulder, f"{side}_elbow": elbow, f"{side}_wrist": wrist}
-    joint[f"{side}_hand"] = wrist + hand @ (at["hand"] - at["wrist"])
-    frame |= {f"{side}_clavicle": (clavicle, sternum), f"{side}_upper_arm": (upper_arm, shoulder), f"{side}_forearm": (forearm, elbow),
-              f"{side}_hand": (hand, wrist), f"{side}_fingers": fingers(hand, wrist, at["hand"] - at["wrist"], np.zeros(len(wrist)))}
+    forearm = _between(bare, shortest_rotation(hand[..., 0], bare[..., 0], 1e-6) @ hand)  # half of the hand's axial rotation
+    parts.add_arm(side, clavicle, upper_arm, bare, forearm, hand, np.zeros(len(hand)))
 
 
-def _leg(body: Mannequin, bones: Points, p: Points, calm: Points, side: str, pelvis: Array, joint: Points, frame: dict) -> None:
-    """Add thigh, shank, foot and toes of one side to `joint` and `frame`."""
+def _add_leg(parts: Assembly, body: Mannequin, p: JointPlaces, calm: JointPlaces, side: str) -> None:
+    """Add thigh, shank, foot and toes of one side."""
+    pelvis, centre = parts.frame["pelvis"]
     hip, knee, ankle = (p[f"{side}_{name}"] for name in ("hip", "knee", "ankle"))
     ahead = _steady_normals(knee - (hip + ankle) / 2, pelvis @ np.array([0, -1.0, 0]))
     thigh, shank = (_along_z(_unit(a - b), -ahead) for a, b in ((hip, knee), (knee, ankle)))
     axes = (f"{side}_ankle", f"{side}_ball", f"{side}_ankle", f"{side}_knee")
     foot = _frame(p, *axes) @ _frame(calm, *axes).swapaxes(1, 2)
     bend = _bend(p, side) - _bend(calm, side)
-    joint[f"{side}_hip"] = joint["pelvis"] + pelvis @ (bones[f"{side}_hip"] - bones["pelvis"])
-    joint[f"{side}_knee"] = joint[f"{side}_hip"] - thigh @ np.array([0, 0, body.length("thigh")])
-    joint[f"{side}_ankle"] = joint[f"{side}_knee"] - shank @ np.array([0, 0, body.length("shank")])
-    at = joint[f"{side}_ankle"]
-    frame |= {f"{side}_thigh": (thigh, joint[f"{side}_hip"]), f"{side}_shank": (shank, joint[f"{side}_knee"]), f"{side}_foot": (foot, at),
-              f"{side}_toes": (foot @ rotations(-bend, 0 * bend, 0 * bend), at + foot @ body.ball())}
+    hip = centre + pelvis @ (parts.rest[f"{side}_hip"] - parts.rest["pelvis"])
+    knee = hip - thigh @ np.array([0, 0, body.length("thigh")])
+    ankle = knee - shank @ np.array([0, 0, body.length("shank")])
+    parts.joint |= {f"{side}_hip": hip, f"{side}_knee": knee, f"{side}_ankle": ankle}
+    parts.frame |= {f"{side}_thigh": (thigh, hip), f"{side}_shank": (shank, knee), f"{side}_foot": (foot, ankle),
+                    f"{side}_toes": (foot @ rotations(-bend, 0 * bend, 0 * bend), ankle + foot @ body.ball())}
 
 
-def _bend(p: Points, side: str) -> Array:
+def _bend(p: JointPlaces, side: str) -> Array:
     """Upward bend of the toes against the foot, rad, of shape (T,)."""
     foot, toes = _unit(p[f"{side}_ball"] - p[f"{side}_ankle"]), _unit(p[f"{side}_toes"] - p[f"{side}_ball"])
     across = np.cross(foot, _unit(p[f"{side}_knee"] - p[f"{side}_ankle"]))
     return np.arctan2((np.cross(foot, toes) * _unit(across)).sum(1), (foot * toes).sum(1))
 
 
-def _on_the_floor(body: Mannequin, figure: Figure) -> Figure:
+def _on_the_floor(body: Mannequin, figure: PosedBody) -> PosedBody:
     """The figure shifted vertically so that the lowest ankle or ball is as high as in standing (2nd percentile over time)."""
-    from shadowpuppet.synthetic.person.kinematics import SEGMENTS
-
     lowest = []
     for side in SIDES:
         ball = figure.origin[:, SEGMENTS.index(f"{side}_toes"), 2] - (body.ball()[2] + body.length("ankle"))
         lowest += [ball, figure.origin[:, SEGMENTS.index(f"{side}_foot"), 2] - body.length("ankle")]
     shift = np.array([0, 0, -float(np.percentile(np.min(lowest, 0), 2))])
-    return Figure(figure.joints + shift, figure.rotation, figure.origin + shift, figure.curl)
+    return PosedBody(figure.joints + shift, figure.rotation, figure.origin + shift, figure.curl)
 
 
 def _steady_normals(plane: Array, usual: Array) -> Array:
@@ -188,16 +170,6 @@ def _along_z(z: Array, y: Array) -> Array:
     return np.stack([np.cross(y, z), y, z], -1)
 
 
-def _swing(start: Array, end: Array) -> Array:
-    """The shortest rotations (T, 3, 3) from unit vectors `start` to `end`, (T or 1, 3)."""
-    start, end = np.broadcast_arrays(start, end)
-    axis, cosine = np.cross(start, end), (start * end).sum(1)
-    K = np.zeros((len(axis), 3, 3))
-    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
-    K -= K.swapaxes(1, 2)
-    return np.eye(3) + K + K @ K / np.maximum(1 + cosine, 1e-6)[:, None, None]
-
-
 def _between(a: Array, b: Array) -> Array:
     """Rotations (T, 3, 3) halfway from `a` to `b`."""
     from scipy.spatial.transform import Rotation
@@ -206,7 +178,7 @@ def _between(a: Array, b: Array) -> Array:
     return a @ Rotation.from_rotvec(half).as_matrix()
 
 
-def _length(p: Points, a: str, b: str) -> float:
+def _length(p: JointPlaces, a: str, b: str) -> float:
     """Mean distance of two joints of both sides."""
     return float(np.mean([np.linalg.norm(p[f"{side}_{a}"] - p[f"{side}_{b}"]) for side in SIDES]))
 

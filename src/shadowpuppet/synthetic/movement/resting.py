@@ -1,7 +1,7 @@
 """Resting postures: seated on a chair, kneeling upright, lying on the back, each from the first frame to the last.
 
 The pelvis rests over the person's place and gestures move arms and trunk above it; the legs are solved by inverse kinematics, as in
-standing. The floor carries the feet of a seated person, knees and insteps of one who kneels, back and heels of one who lies.
+standing. The floor carries the feet of a seated person, knees and insteps of a kneeling one, back and heels of a lying one.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.movement.gait_cycle import smoothstep
 from shadowpuppet.synthetic.movement.gestures import STANDING, Posture, both, trunk
-from shadowpuppet.synthetic.person.kinematics import CHANNELS, SIDES, TOE_OUT, Stance, rotations
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, SIDES, TOE_OUT, LegPlacement, rotations
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 PostureName = Literal["standing", "seated", "kneeling", "lying"]
@@ -35,7 +35,7 @@ RESTS: dict[str, Posture] = {
     "kneeling": trunk(pelvis_bow=2, spine_bow=3),
     "lying": both(front=-7, side=8, elbow=2) | trunk(pelvis_bow=-90, spine_bow=2),
 }
-"""What each posture adds to the channels of a gesture, rad; to an arm's while it hangs."""
+"""Values that each posture adds to the channels of a gesture, rad; to an arm's while it hangs."""
 RAISED = np.radians(45)
 """Change of an arm's swing and elbow against standing beyond which it no longer hangs, rad."""
 
@@ -51,7 +51,7 @@ def seated_pelvis(body: Mannequin) -> float:
 
 
 def kneeling_knee(body: Mannequin) -> float:
-    """Height of the knee's centre of a person who kneels on it, metres."""
+    """Height of a kneeling person's knee centre, metres."""
     return 0.97 * body.measure("knee") / (2 * np.pi) + 0.012
 
 
@@ -67,18 +67,19 @@ def chair_place(body: Mannequin, posture: PostureName, turn: float) -> tuple[flo
     return float(ahead * np.sin(turn)), float(ahead * np.cos(turn)), scale
 
 
-def resting_stance(body: Mannequin, posture: PostureName, postures: Array) -> tuple[Array, Stance]:
+def resting_stance(body: Mannequin, posture: PostureName, postures: Array) -> tuple[Array, LegPlacement]:
     """Postures (T, `CHANNELS`) of gestures, changed to those of a resting person, and where pelvis and feet are."""
     postures = _rested(posture, postures)
     if posture == "lying":
-        postures[:, CHANNELS.index("head_nod")] -= _head_gap(body) / NOD_LEVER
+        gap = float(_back(body) - (body.measure("head_length") / 2 - 0.008 * body.stature))  # of the head while the neck is straight
+        postures[:, CHANNELS.index("head_nod")] -= gap / NOD_LEVER
     yaw = rotations(*np.zeros((2, 1)), postures[:, CHANNELS.index("turn")])
     high, ankles, pitch, knees = {"seated": _seated, "kneeling": _kneeling, "lying": _lying}[posture](body)
     count, out = len(postures), np.array([1, -1]) * (0.35 if posture == "lying" else TOE_OUT)
     feet = np.stack([rotations(*np.zeros((2, 1)), out[n : n + 1]) @ rotations(np.full(1, -pitch), *np.zeros((2, 1))) for n in (0, 1)], 1)
     pelvis = np.broadcast_to([0.0, 0.0, high], (count, 3))
     ahead = np.stack([knees * [1, 1, 1], knees * [-1, 1, 1]])
-    return postures, Stance(pelvis, (yaw[:, None] @ ankles[..., None])[..., 0], yaw[:, None] @ feet, np.zeros((count, 2)),
+    return postures, LegPlacement(pelvis, (yaw[:, None] @ ankles[..., None])[..., 0], yaw[:, None] @ feet, np.zeros((count, 2)),
                             (yaw[:, None] @ ahead[..., None])[..., 0])  # fmt: skip
 
 
@@ -92,11 +93,6 @@ def _rested(posture: PostureName, postures: Array) -> Array:
     for name, value in RESTS[posture].items():
         rested[:, of[name]] += value * hangs.get(name.partition("_")[0], 1.0)
     return rested
-
-
-def _head_gap(body: Mannequin) -> float:
-    """Height of the back of a lying person's head over the floor while the neck is straight, metres."""
-    return float(_back(body) - (body.measure("head_length") / 2 - 0.008 * body.stature))
 
 
 def _back(body: Mannequin) -> float:

@@ -26,7 +26,7 @@ class Gesture:
     motion: MotionName
     """Name: a gesture of arms and trunk, a whole-body action, `walk`, `jog`, or `mocap` from a file."""
     seconds: Annotated[float, Field(ge=SHORTEST, le=3600)] = 4.0
-    """Length, seconds; at most that of the file."""
+    """Length, seconds; at most the file's."""
     speed: Annotated[float, Field(ge=0.4, le=5)] | None = None
     """Speed of walk (0.4 to 2.0) and jog (1.6 to 5), m/s; by default a comfortable one."""
     path: PathName = "circle"

@@ -9,7 +9,7 @@ import numpy as np
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.movement.actions import ACTIONS
-from shadowpuppet.synthetic.movement.gait import Walk
+from shadowpuppet.synthetic.movement.gait import PathWalk
 from shadowpuppet.synthetic.movement.gait_cycle import smoothstep
 from shadowpuppet.synthetic.movement.gestures import (
     GESTURES,
@@ -18,11 +18,11 @@ from shadowpuppet.synthetic.movement.gestures import (
     duration,
     gesture_postures,
     interpolate_keys,
+    involuntary_motion,
     key_postures,
 )
-from shadowpuppet.synthetic.movement.involuntary import involuntary_motion
 from shadowpuppet.synthetic.movement.resting import PostureName, resting_stance
-from shadowpuppet.synthetic.person.kinematics import CHANNELS, Figure, Stance, planted_stance, pose, pose_over, rotations
+from shadowpuppet.synthetic.person.kinematics import CHANNELS, LegPlacement, PosedBody, planted_stance, pose, pose_over, rotations
 from shadowpuppet.synthetic.person.mannequin import Mannequin
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class MotionPart(Protocol):
 
     seconds: float
 
-    def at(self, t: Array) -> tuple[Array, Stance]:
+    def at(self, t: Array) -> tuple[Array, LegPlacement]:
         """Postures (T, `CHANNELS`) and stance at its own times (T,), s, from the origin facing -Y."""
         ...
 
@@ -52,7 +52,7 @@ class PlantedGestures:
         self.body, self.seconds = body, sum(seconds for _, seconds in gestures)
         self.keys = key_postures(gestures, rng)
 
-    def at(self, t: Array) -> tuple[Array, Stance]:
+    def at(self, t: Array) -> tuple[Array, LegPlacement]:
         """As `MotionPart.at`."""
         postures = interpolate_keys(self.keys, np.clip(t + LEAD_SECONDS, 0, None))
         return postures, planted_stance(self.body, postures)
@@ -76,7 +76,7 @@ def sequence_seconds(gestures: Sequence[Gesture]) -> float:
 
 
 def animate(body: Mannequin, gestures: Sequence[Gesture], t: Array, rng: np.random.Generator, still: float = 1.0, turn: float = 0.0,
-            posture: PostureName = "standing") -> Figure:
+            posture: PostureName = "standing") -> PosedBody:
     """The figure of `body` at times `t` (T,), s; it stands for `LEAD_SECONDS` before the first of `gestures`.
 
     still: factor on sway and tremor. turn: initial heading, rad to the left of -Y. The area covered in walking is centred at the origin.
@@ -98,7 +98,7 @@ def animate(body: Mannequin, gestures: Sequence[Gesture], t: Array, rng: np.rand
     restless = still * involuntary_motion(t, rng)
     sway = restless[:, [CHANNELS.index("sway_x"), CHANNELS.index("sway_y")]]
     postures = clamp_joints(postures + restless)
-    shift = _middle(parts, turn) if _goes(gestures) else np.zeros(3)
+    shift = _middle(parts, turn) if any(gesture.motion in ("walk", "jog") for gesture in gestures) else np.zeros(3)
     moved = stance._replace(pelvis=stance.pelvis - shift + np.column_stack([sway, 0 * t]), ankles=stance.ankles - shift)
     return pose_over(body, postures, moved, SOFT_LIMIT)
 
@@ -108,11 +108,6 @@ def _middle(parts: Sequence[MotionPart], turn: float) -> Array:
     whole = np.arange(0, LEAD_SECONDS + sum(part.seconds for part in parts), 0.05)
     places = _joined(parts, whole, turn)[1].pelvis[:, :2]
     return np.append((places.max(0) + places.min(0)) / 2, 0.0)
-
-
-def _goes(gestures: Sequence[Gesture]) -> bool:
-    """Whether any part is walking or jogging."""
-    return any(gesture.motion in ("walk", "jog") for gesture in gestures)
 
 
 def _parts(body: Mannequin, gestures: Sequence[Gesture], rng: np.random.Generator) -> list[MotionPart]:
@@ -130,11 +125,11 @@ def _parts(body: Mannequin, gestures: Sequence[Gesture], rng: np.random.Generato
             parts.append(ACTIONS[gesture.motion](body, gesture.seconds, rng))
         elif gesture is not None:
             jogging = gesture.motion == "jog"
-            parts.append(Walk(body, gesture.seconds, rng, jogging, gesture.speed, gesture.path, gesture.size))
+            parts.append(PathWalk(body, gesture.seconds, rng, jogging, gesture.speed, gesture.path, gesture.size))
     return parts
 
 
-def _joined(parts: Sequence[MotionPart], t: Array, turn: float) -> tuple[Array, Stance]:
+def _joined(parts: Sequence[MotionPart], t: Array, turn: float) -> tuple[Array, LegPlacement]:
     """Postures and stance of `parts`, each starting where the one before ended, with trunk and arms blended."""
     begin, place = LEAD_SECONDS, FloorPose(turn=turn)
     postures, pieces, of = np.zeros((len(t), len(CHANNELS))), [], np.zeros(len(t), int)
@@ -150,10 +145,10 @@ def _joined(parts: Sequence[MotionPart], t: Array, turn: float) -> tuple[Array, 
         middle = at_end.ankles[0].mean(0)
         place, begin = FloorPose(float(middle[0]), float(middle[1]), float(last[0, CHANNELS.index("turn")])), end
     which = (of, np.arange(len(t)))
-    return postures, Stance(*(np.stack(values)[which] for values in zip(*pieces)))
+    return postures, LegPlacement(*(np.stack(values)[which] for values in zip(*pieces)))
 
 
-def _placed(postures: Array, stance: Stance, place: FloorPose) -> tuple[Array, Stance]:
+def _placed(postures: Array, stance: LegPlacement, place: FloorPose) -> tuple[Array, LegPlacement]:
     """Postures and stance moved to `place`."""
     R = rotations(*np.zeros((2, 1)), np.array([place.turn]))[0]
     shift = np.array([place.x, place.y, 0.0])
@@ -161,4 +156,4 @@ def _placed(postures: Array, stance: Stance, place: FloorPose) -> tuple[Array, S
     postures[:, CHANNELS.index("turn")] += place.turn
     high = np.column_stack([stance.pelvis[:, :2], np.zeros(len(postures))]) @ R.T + shift
     pelvis = np.column_stack([high[:, :2], stance.pelvis[:, 2]])
-    return postures, Stance(pelvis, stance.ankles @ R.T + shift, R @ stance.feet, stance.toes, stance.ahead @ R.T)
+    return postures, LegPlacement(pelvis, stance.ankles @ R.T + shift, R @ stance.feet, stance.toes, stance.ahead @ R.T)

@@ -7,7 +7,7 @@ import numpy as np
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.mannequin import Mannequin
-from shadowpuppet.synthetic.person.surface import Loft, Rows, ellipsoid, loft_between
+from shadowpuppet.synthetic.person.surface import Loft, Sections, ellipsoid, loft_between
 
 
 def head(body: Mannequin, clothes: Clothes) -> list[Loft]:
@@ -55,7 +55,7 @@ def _hair(skull: Array, size: tuple[float, float, float], joint: Array, thick: f
     cap = ellipsoid("head", joint, skull + np.array([0, 0.13 * deep + 0.9 * thick, 0.05 * high]),
                     (wide + 0.7 * thick, 0.94 * deep + thick, 0.42 * high + 0.6 * thick), blend=0.006, **hair)
     top = skull + np.array([0, 0.45 * deep, 0.02 * high])
-    rows: Rows = [(0, 0.95 * wide, 0.55 * deep), (0.5, 1.02 * wide, 0.50 * deep), (1, 0.85 * wide, 0.34 * deep)]
+    rows: Sections = [(0, 0.95 * wide, 0.55 * deep), (0.5, 1.02 * wide, 0.50 * deep), (1, 0.85 * wide, 0.34 * deep)]
     return (
         [cap, loft_between("head", joint, top, top + np.array([0, 0.020, -0.62 * high]), rows, caps=(0.04, 0.02), blend=0.02, **hair)]
         if long

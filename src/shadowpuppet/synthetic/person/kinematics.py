@@ -42,7 +42,7 @@ HANGING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """The left upper arm's frame when it hangs, in the thorax' frame: its bone (x) points down."""
 
 
-class Figure(NamedTuple):
+class PosedBody(NamedTuple):
     """A mannequin in T postures."""
 
     joints: Array
@@ -55,7 +55,7 @@ class Figure(NamedTuple):
     """Curl of the left and right fingers, of shape (T, 2), 0 to 1."""
 
 
-class Stance(NamedTuple):
+class LegPlacement(NamedTuple):
     """Pelvis and feet in T postures; the legs follow by two-bone inverse kinematics."""
 
     pelvis: Array
@@ -77,7 +77,7 @@ def rotations(*vector: Array) -> Array:
     return Rotation.from_rotvec(np.stack(np.broadcast_arrays(*vector), -1)).as_matrix()
 
 
-def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> Figure:
+def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> PosedBody:
     """The figure of `body` in `postures` (T, `CHANNELS`), its feet planted about the world's origin.
 
     stance: half the distance between the ankles over the leg's length. The feet stay in place: the pelvis sinks as far as both legs
@@ -86,8 +86,8 @@ def pose(body: Mannequin, postures: Array, stance: float = 0.13) -> Figure:
     return pose_over(body, postures, planted_stance(body, postures, stance))
 
 
-def planted_stance(body: Mannequin, postures: Array, stance: float = 0.13) -> Stance:
-    """The `Stance` of `pose`: feet side by side about the origin, the pelvis as high as the legs allow."""
+def planted_stance(body: Mannequin, postures: Array, stance: float = 0.13) -> LegPlacement:
+    """The `LegPlacement` of `pose`: feet side by side about the origin, the pelvis as high as the legs allow."""
     q = dict(zip(CHANNELS, np.asarray(postures, float).T))
     yaw = _yaw(q)
     half, height = stance * (body.length("thigh") + body.length("shank")), body.rest()["left_ankle"][2]
@@ -95,40 +95,62 @@ def planted_stance(body: Mannequin, postures: Array, stance: float = 0.13) -> St
     ankles = np.stack([yaw @ np.array([sign * half, 0, height]) for sign in (1, -1)], 1)
     feet = np.stack([yaw @ rotations(*np.zeros((2, 1)), np.array([out])) for out in (TOE_OUT, -TOE_OUT)], 1)
     ahead = np.repeat((yaw @ np.array([0.0, -1.0, 0.0]))[:, None], 2, 1)
-    return Stance(sway + np.array([0, 0, np.inf]), ankles, feet, np.zeros((len(yaw), 2)), ahead)
+    return LegPlacement(sway + np.array([0, 0, np.inf]), ankles, feet, np.zeros((len(yaw), 2)), ahead)
 
 
-def pose_over(body: Mannequin, postures: Array, stance: Stance, soft: float = 0.0) -> Figure:
+def pose_over(body: Mannequin, postures: Array, stance: LegPlacement, soft: float = 0.0) -> PosedBody:
     """The figure of `body` in `postures` (T, `CHANNELS`); `stance` gives pelvis and feet, in place of the postures' `sway`.
 
     soft: metres below its limit from which on the pelvis is held down smoothly; 0 for a hard limit.
     """
     q = dict(zip(CHANNELS, np.asarray(postures, float).T))
-    rest = body.rest()
-    joint: dict[str, Array] = {}
-    frame: dict[str, tuple[Array, Array]] = {}
+    parts = Assembly(body.rest())
     pelvis = _yaw(q) @ rotations(q["pelvis_bow"], q["pelvis_side"], q["pelvis_twist"])
-    joint["pelvis"] = _legs(body, pelvis, stance, soft, joint, frame)
-    frame["pelvis"] = pelvis, joint["pelvis"]
     half = rotations(q["spine_bow"] / 2, q["spine_side"] / 2, q["spine_twist"] / 2)
-    abdomen, thorax = pelvis @ half, pelvis @ half @ half
-    lumbar = joint["pelvis"] + pelvis @ (rest["lumbar"] - rest["pelvis"])
-    thoracic = lumbar + abdomen @ (rest["thoracic"] - rest["lumbar"])
-    joint["neck"] = thoracic + thorax @ (rest["neck"] - rest["thoracic"])
+    thorax = pelvis @ half @ half
     nod = rotations(q["head_nod"] / 2, q["head_tilt"] / 2, q["head_turn"] / 2)
-    neck, head = thorax @ nod, thorax @ nod @ nod
-    joint["head"] = joint["neck"] + neck @ (rest["head"] - rest["neck"])
-    frame |= {"abdomen": (abdomen, lumbar), "thorax": (thorax, thoracic)}
-    frame |= {"neck": (neck, joint["neck"]), "head": (head, joint["head"])}
+    parts.add_trunk(_add_legs(parts, body, pelvis, stance, soft), pelvis, pelvis @ half, thorax, thorax @ nod, thorax @ nod @ nod)
     for side in SIDES:
-        _arm(rest, q, side, thorax, thoracic, joint, frame)
-    return assemble_figure(joint, frame, np.stack([q["left_curl"], q["right_curl"]], 1))
+        _add_arm(parts, q, side)
+    return parts.figure(np.stack([q["left_curl"], q["right_curl"]], 1))
 
 
-def assemble_figure(joint: dict[str, Array], frame: dict[str, tuple[Array, Array]], curl: Array) -> Figure:
-    """A `Figure` from joints (T, 3) and from segments' frames and origins, by name; fingers bent by `curl` (T, 2)."""
-    return Figure(np.stack([joint[name] for name in JOINTS], 1), np.stack([frame[name][0] for name in SEGMENTS], 1),
-                  np.stack([frame[name][1] for name in SEGMENTS], 1), curl)
+class Assembly:
+    """Joints (T, 3) and segment frames (T, 3, 3) of a mannequin, added part by part from the pelvis on."""
+
+    def __init__(self, rest: dict[str, Array]) -> None:
+        """rest: `Mannequin.rest`."""
+        self.rest = rest
+        self.joint: dict[str, Array] = {}
+        self.frame: dict[str, tuple[Array, Array]] = {}
+
+    def add_trunk(self, centre: Array, pelvis: Array, abdomen: Array, thorax: Array, neck: Array, head: Array) -> None:
+        """Add pelvis, trunk and head by their frames; centre: of the pelvis, of shape (T, 3), metres, world."""
+        rest = self.rest
+        lumbar = centre + pelvis @ (rest["lumbar"] - rest["pelvis"])
+        thoracic = lumbar + abdomen @ (rest["thoracic"] - rest["lumbar"])
+        nape = thoracic + thorax @ (rest["neck"] - rest["thoracic"])
+        self.joint |= {"pelvis": centre, "neck": nape, "head": nape + neck @ (rest["head"] - rest["neck"])}
+        self.frame |= {"pelvis": (pelvis, centre), "abdomen": (abdomen, lumbar), "thorax": (thorax, thoracic), "neck": (neck, nape),
+                       "head": (head, self.joint["head"])}
+
+    def add_arm(self, side: str, clavicle: Array, upper: Array, fore: Array, forearm: Array, hand: Array, curl: Array) -> None:
+        """Add an arm by its frames, after the trunk; fore: the frame that carries the wrist, forearm: the surface's; curl: (T,)."""
+        at = {name: self.rest[f"{side}_{name}"] for name in ("clavicle", "shoulder", "elbow", "wrist", "hand")}
+        thorax, thoracic = self.frame["thorax"]
+        sternum = thoracic + thorax @ (at["clavicle"] - self.rest["thoracic"])
+        shoulder = sternum + clavicle @ (at["shoulder"] - at["clavicle"])
+        elbow = shoulder + upper @ (at["elbow"] - at["shoulder"])
+        wrist = elbow + fore @ (at["wrist"] - at["elbow"])
+        base = at["hand"] - at["wrist"]
+        self.joint |= {f"{side}_shoulder": shoulder, f"{side}_elbow": elbow, f"{side}_wrist": wrist, f"{side}_hand": wrist + hand @ base}
+        self.frame |= {f"{side}_clavicle": (clavicle, sternum), f"{side}_upper_arm": (upper, shoulder), f"{side}_forearm": (forearm, elbow),
+                       f"{side}_hand": (hand, wrist), f"{side}_fingers": _fingers(hand, wrist, base, curl)}
+
+    def figure(self, curl: Array) -> PosedBody:
+        """The figure with the fingers bent by `curl` (T, 2)."""
+        rotation, origin = zip(*(self.frame[name] for name in SEGMENTS))
+        return PosedBody(np.stack([self.joint[name] for name in JOINTS], 1), np.stack(rotation, 1), np.stack(origin, 1), curl)
 
 
 def _yaw(q: dict[str, Array]) -> Array:
@@ -136,19 +158,18 @@ def _yaw(q: dict[str, Array]) -> Array:
     return rotations(0 * q["turn"], 0 * q["turn"], q["turn"])
 
 
-def _arm(rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, thoracic: Array, joint: dict, frame: dict) -> None:
-    """Add clavicle, upper arm, forearm and hand of one side to `joint` and `frame`.
+def _add_arm(parts: Assembly, q: dict[str, Array], side: str) -> None:
+    """Add the arm of one side.
 
     The clavicle rises by 0.13 of the arm's elevation beyond 25 degrees and protracts by 0.12 of its forward swing (after Ludewig et al.
     2009).
     """
-    mirror = np.ones(3) if side == "left" else MIRROR
+    mirror, thorax = np.ones(3) if side == "left" else MIRROR, parts.frame["thorax"][0]
 
     def about(x: Array | float, y: Array | float, z: Array | float) -> Array:
         return rotations(*(m * np.asarray(v) + 0 * q["turn"] for m, v in zip(mirror, (x, y, z))))
 
     arm = {name: q[f"{side}_{name}"] for name in ARM}
-    at = {name: rest[f"{side}_{name}"] for name in ("clavicle", "shoulder", "elbow", "wrist", "hand")}
     raised = np.hypot(arm["side"], arm["front"])
     soft = 0.15 * np.logaddexp(0, (raised - 0.44) / 0.15)
     clavicle = thorax @ about(0, -(0.13 * soft + arm["shrug"]), -(0.12 * np.maximum(arm["front"], 0) + arm["protract"]))
@@ -157,27 +178,19 @@ def _arm(rest: dict[str, Array], q: dict[str, Array], side: str, thorax: Array, 
     fore = upper @ about(0, 0, -arm["elbow"])
     half, full = (fore @ about(-arm["supination"] * share, 0, 0) for share in (0.5, 1.0))
     hand = full @ about(0, arm["wrist_flex"], 0) @ about(0, 0, -arm["wrist_side"])
-    sternum = thoracic + thorax @ (at["clavicle"] - rest["thoracic"])
-    shoulder = sternum + clavicle @ (at["shoulder"] - at["clavicle"])
-    elbow = shoulder + upper @ (at["elbow"] - at["shoulder"])
-    wrist = elbow + fore @ (at["wrist"] - at["elbow"])
-    joint |= {f"{side}_shoulder": shoulder, f"{side}_elbow": elbow, f"{side}_wrist": wrist,
-              f"{side}_hand": wrist + hand @ (at["hand"] - at["wrist"])}
-    frame |= {f"{side}_clavicle": (clavicle, sternum), f"{side}_upper_arm": (upper, shoulder), f"{side}_forearm": (half, elbow),
-              f"{side}_hand": (hand, wrist), f"{side}_fingers": fingers(hand, wrist, at["hand"] - at["wrist"], arm["curl"])}
+    parts.add_arm(side, clavicle, upper, fore, half, hand, arm["curl"])
 
 
-def fingers(hand: Array, wrist: Array, base: Array, curl: Array) -> tuple[Array, Array]:
+def _fingers(hand: Array, wrist: Array, base: Array, curl: Array) -> tuple[Array, Array]:
     """Frame (T, 3, 3) of the fingers and place (T, 3) of the knuckles; base: the joint `hand` from the wrist in the hand's frame."""
     close = np.clip((curl - FIST_CURL[0]) / (FIST_CURL[1] - FIST_CURL[0]), 0, 1)
     bend = np.radians(115) * np.sign(base[0]) * close
     return hand @ rotations(0 * bend, bend, 0 * bend), wrist + hand @ (KNUCKLES / HAND_POINT * base)
 
 
-def _legs(body: Mannequin, pelvis: Array, stance: Stance, soft: float, joint: dict, frame: dict) -> Array:
-    """Centre of the pelvis (T, 3), no higher than both legs reach; adds the legs to `joint` and `frame`."""
-    thigh, shank = body.length("thigh"), body.length("shank")
-    rest = body.rest()
+def _add_legs(parts: Assembly, body: Mannequin, pelvis: Array, stance: LegPlacement, soft: float) -> Array:
+    """Add the legs; returns the centre of the pelvis (T, 3), no higher than both legs reach."""
+    thigh, shank, rest = body.length("thigh"), body.length("shank"), parts.rest
     hips = [pelvis @ (rest[f"{side}_hip"] - rest["pelvis"]) for side in SIDES]
     ankles = [stance.ankles[:, n] for n in (0, 1)]
     sway, span = np.where([True, True, False], stance.pelvis, 0.0), MAX_LEG_SPAN * (thigh + shank)
@@ -190,9 +203,9 @@ def _legs(body: Mannequin, pelvis: Array, stance: Stance, soft: float, joint: di
         hip, ankle, ahead, foot = centre + hips[n], ankles[n], stance.ahead[:, n], stance.feet[:, n]
         knee, ahead = _bent(hip, ankle, ahead, thigh, shank)
         toes = foot @ rotations(-stance.toes[:, n], np.zeros(1), np.zeros(1))
-        joint |= {f"{side}_hip": hip, f"{side}_knee": knee, f"{side}_ankle": ankle}
-        frame |= {f"{side}_thigh": (_upright(hip - knee, ahead), hip), f"{side}_shank": (_upright(knee - ankle, ahead), knee),
-                  f"{side}_foot": (foot, ankle), f"{side}_toes": (toes, ankle + foot @ body.ball())}
+        parts.joint |= {f"{side}_hip": hip, f"{side}_knee": knee, f"{side}_ankle": ankle}
+        parts.frame |= {f"{side}_thigh": (_upright(hip - knee, ahead), hip), f"{side}_shank": (_upright(knee - ankle, ahead), knee),
+                        f"{side}_foot": (foot, ankle), f"{side}_toes": (toes, ankle + foot @ body.ball())}
     return centre
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.mannequin import KNUCKLES, Mannequin
-from shadowpuppet.synthetic.person.surface import Loft, Rows, frame_of, stations_of
+from shadowpuppet.synthetic.person.surface import Loft, Sections, frame_of, stations_of
 
 DOWN = np.diag([1.0, 1.0, -1.0])
 ALONG_X = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
@@ -24,7 +24,7 @@ def arm(body: Mannequin, clothes: Clothes) -> list[Loft]:
     elbow, end = 0.45 * (biceps + belly), clothes.sleeve * (upper + fore)
     cloth = 0.0056 + 0.52 * min(clothes.looseness, 0.02)
     sleeved: dict[str, Any] = {"materials": ("shirt", "skin"), "group": "left_arm"}
-    rows: Rows = [
+    rows: Sections = [
         (0, 1.06 * biceps, 1.10 * biceps, 0, -0.010),
         (0.25, 1.05 * biceps, 1.06 * biceps, 0, -0.006),
         (0.5, biceps, biceps, 0.006),
@@ -62,7 +62,7 @@ def _sleeved(stations: Array, end: float, cloth: float) -> Array:
 def _hand(length: float, half: float, wrist: float) -> list[Loft]:
     """Palm, fingers a little spread and bent, thumb; the palm looks down in the T-pose (fingers after Garrett 1971)."""
     thick, group = 0.31 * half, "left_arm"
-    rows: Rows = [
+    rows: Sections = [
         (0, 1.05 * wrist, 0.80 * wrist),
         (0.2 * length, 0.78 * half, 1.12 * thick, 0, 0.002),
         (0.42 * length, half, thick, 0, 0.001),
@@ -89,7 +89,7 @@ def leg(body: Mannequin, clothes: Clothes) -> list[Loft]:
     """Thigh, shank and shoe of the left leg, in trousers."""
     thigh, knee, calf, ankle = (body.measure(name) / (2 * np.pi) for name in ("thigh", "knee", "calf", "ankle"))
     cloth, upper, lower = [0, *2 * [clothes.looseness + 0.004], 0, 0], body.length("thigh"), body.length("shank")
-    rows: Rows = [
+    rows: Sections = [
         (-0.06, 0.72 * thigh, 0.76 * thigh, -0.012, 0.004),
         (0.06, 0.92 * thigh, 0.95 * thigh, -0.010, 0.004),
         (0.2, 0.96 * thigh, 0.99 * thigh, -0.006),
@@ -119,7 +119,7 @@ bare heel's is 49 mm behind (Delp et al. 1990, as OpenSim's gait2392 has it for 
 def _foot(body: Mannequin) -> list[Loft]:
     """The left shoe, of some 10 mm over the foot; its sole is flat from heel to ball, 2 mm over the floor, and it bends at the ball."""
     long, broad = body.measure("foot_length"), body.measure("foot_breadth") / 2
-    rows: Rows = [
+    rows: Sections = [
         (0, 0.66 * broad, 0.034, 0, -0.006),
         (0.17, 0.70 * broad, 0.042, 0, -0.014),
         (0.27, 0.76 * broad, 0.045, 0, -0.017),

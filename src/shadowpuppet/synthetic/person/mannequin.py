@@ -17,7 +17,7 @@ from shadowpuppet.errors import SettingsError
 from shadowpuppet.geometry import Array
 from shadowpuppet.settings import STRICT
 
-Kind = Literal["woman", "man", "child"]
+PersonKind = Literal["woman", "man", "child"]
 
 JOINTS = ("pelvis", "neck", "head", *(f"{side}_{joint}" for side in ("left", "right") for joint in ("shoulder", "elbow", "wrist", "hand")),
           *(f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle")))
@@ -83,7 +83,7 @@ class Mannequin:
     """Factor on thigh and shank; the trunk compensates for it."""
 
     @classmethod
-    def draw(cls, rng: np.random.Generator, kind: Kind | None = None, *, stature: float | None = None, bmi: float | None = None,
+    def draw(cls, rng: np.random.Generator, kind: PersonKind | None = None, *, stature: float | None = None, bmi: float | None = None,
              age: float | None = None) -> Mannequin:
         """A random plausible person; by default of a random kind (every sixth a child).
 

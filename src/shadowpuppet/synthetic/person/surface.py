@@ -17,7 +17,7 @@ from shadowpuppet.synthetic.person.kinematics import SEGMENTS
 MATERIALS = ("skin", "shirt", "trousers", "hair", "shoes", "eyes", "lips")
 GROUPS = ("trunk", "left_arm", "right_arm", "left_leg", "right_leg")
 """Parts blend within a group, and limbs with the trunk only close to shoulder or hip: a hanging arm does not melt into it."""
-Rows = list[tuple[float, ...]]
+Sections = list[tuple[float, ...]]
 """Cross-sections: (place along the axis, half width, half depth[, centre's width, centre's depth])."""
 LOFT_SAMPLES = 33
 """Cross-sections of a loft."""
@@ -98,7 +98,7 @@ class Surface(NamedTuple):
         return (np.maximum(self.table[..., 0], self.table[..., 1]) + np.hypot(self.table[..., 2], self.table[..., 3])).max(1)
 
 
-def loft_between(segment: str, joint: Array, start: Array, end: Array, rows: Rows, **more: Any) -> Loft:
+def loft_between(segment: str, joint: Array, start: Array, end: Array, rows: Sections, **more: Any) -> Loft:
     """A loft from `start` to `end` on a segment with its joint at `joint` (all (3,), world, T-pose); rows: places as shares of length."""
     axis = end - start
     length = float(np.linalg.norm(axis))
@@ -114,7 +114,7 @@ def frame_of(axis: Array, depth: Array) -> Array:
     return np.stack([np.cross(depth, axis), depth, axis], 1)
 
 
-def stations_of(rows: Rows, scale: float = 1.0) -> Array:
+def stations_of(rows: Sections, scale: float = 1.0) -> Array:
     """`Loft.stations` (n, 5) of rows: missing centres are 0; places along the axis are counted from the first and multiplied by `scale`."""
     table = np.array([(*row, *(5 - len(row)) * (0.0,)) for row in rows], float)
     table[:, 0] = (table[:, 0] - table[0, 0]) * scale
@@ -124,5 +124,5 @@ def stations_of(rows: Rows, scale: float = 1.0) -> Array:
 def ellipsoid(segment: str, joint: Array, middle: Array, radii: tuple[float, float, float], **more: Any) -> Loft:
     """An ellipsoid with half axes `radii` (x, y, z), metres: a short loft with long caps."""
     half, cap = np.array([0, 0, 0.02 * radii[2]]), 0.98 * radii[2]
-    rows: Rows = [(0, radii[0], radii[1]), (1, radii[0], radii[1])]
+    rows: Sections = [(0, radii[0], radii[1]), (1, radii[0], radii[1])]
     return loft_between(segment, joint, middle - half, middle + half, rows, caps=(cap, cap), **more)

@@ -6,7 +6,7 @@ import numpy as np
 
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.mannequin import Mannequin
-from shadowpuppet.synthetic.person.surface import Loft, Rows, loft_between, stations_of
+from shadowpuppet.synthetic.person.surface import Loft, Sections, loft_between, stations_of
 
 
 def trunk(body: Mannequin, clothes: Clothes) -> list[Loft]:
@@ -18,7 +18,7 @@ def trunk(body: Mannequin, clothes: Clothes) -> list[Loft]:
     loin, loin_d = 0.4 * hip + 0.6 * waist, 0.4 * seat + 0.6 * belly
     rib, rib_d = 0.6 * waist + 0.4 * chest, 0.6 * belly + 0.4 * breast
     crotch = joints["pelvis"][2] / H - 0.045
-    rows: dict[str, Rows] = {
+    rows: dict[str, Sections] = {
         "pelvis": [
             (crotch, 0.74 * hip, 0.62 * seat, 0, 0.010),
             (crotch + 0.03, 0.96 * hip, 0.96 * seat, 0, 0.010),
@@ -59,7 +59,7 @@ def shoulders(body: Mannequin, clothes: Clothes) -> list[Loft]:
     shirt = {"materials": ("shirt", "shirt")}
     inner = np.array([0.6 * neck, joints["neck"][1] + 0.006, 0.845 * H])
     outer = joints["left_shoulder"] + np.array([-0.006, 0.002, 0.012]) * unit
-    rows: Rows = [
+    rows: Sections = [
         (0, 0.040 * unit, 0.034 * unit),
         (0.5, 0.048 * unit, 0.033 * unit),
         (1, 0.048 * unit * body.girth, 0.038 * unit * body.girth),

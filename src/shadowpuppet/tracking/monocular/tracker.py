@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body.segments import dofs_of, limbs_of
 from shadowpuppet.body.upper_body import TWIST
 from shadowpuppet.camera.bits import count, pack
-from shadowpuppet.camera.colour_codes import Codes
+from shadowpuppet.camera.colour_codes import ColourCode
 from shadowpuppet.camera.mask import Mask, check_mask
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
@@ -82,7 +82,7 @@ class MonocularTracker:
     """Whether the film is blurred by motion. A silhouette then has what a limb covers at any time of the exposure, which is too wide; what
     is covered since this frame only, and so for a part of the exposure, does not count, except in the status."""
 
-    def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None, codes: Codes | None = None) -> State:
+    def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None, codes: ColourCode | None = None) -> State:
         """The state after a new mask (H, W). If no person is visible the pose is held; after a loss the person is searched for (`recover`).
         `also`: a cost of your own, poses (N, D) to pixels (N,), added to eq. 2; `codes`: the picture's colours (`colour_codes`), if the
         arms may be found by them. Raises `TrackingError` for a mask of another size than the camera's."""
@@ -97,7 +97,7 @@ class MonocularTracker:
         found = found._replace(colours=self.learnt(state.colours, codes, rest, found))
         return found._replace(mask=mask) if self.blurred else found
 
-    def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None, codes: Codes | None = None) -> State:
+    def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None, codes: ColourCode | None = None) -> State:
         """The loop body of Algorithm 2 on a mask (H, W), `cycles` times: each stage resamples, diffuses and weighs (Algorithms 3, 4)."""
         last, particles = state.pose, list(state.particles)
         estimate, whole = last, self.observe(mask, last, also, state.unexplained)
@@ -172,7 +172,7 @@ class MonocularTracker:
         legs = self.picture.legs(state.pose) if self.settings.ignore_legs and self.picture.body.hem is not None else None
         return look_beside(last, mask, self.picture.mask(state.pose), self.looks, legs)
 
-    def learnt(self, colours: ColourCounts | None, codes: Codes | None, mask: Mask, state: State) -> ColourCounts | None:
+    def learnt(self, colours: ColourCounts | None, codes: ColourCode | None, mask: Mask, state: State) -> ColourCounts | None:
         """The colours seen so far, with those in a new state's frame, of its mask (H, W), if the estimate fits well."""
         fits = state.status != "absent" and state.overlap > WELL
         if codes is None or not self.settings.arm_colours or not fits:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.bits import Bits, count, pack
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.colour_codes import Codes, step_of, thinned
+from shadowpuppet.camera.colour_codes import ColourCode, step_of, thinned
 from shadowpuppet.camera.mask import Mask, grown, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
@@ -44,7 +44,7 @@ class ArmsInViews:
         thin = [camera.thinned(step_of(camera.size)) for camera in cameras]
         self.views = tuple(ArmColours(Picture(body, camera, camera.T_camera_world)) for camera in thin)
 
-    def learnt(self, counts: Counts, codes: Sequence[Codes | None], masks: Sequence[Mask | None], pose: Array) -> Counts:
+    def learnt(self, counts: Counts, codes: Sequence[ColourCode | None], masks: Sequence[Mask | None], pose: Array) -> Counts:
         """The counts with those of one more frame, of its masks (H, W) and the pose (D,) found in it; as they are where enough is known."""
         found = list[ColourCounts | None]()
         for view, known, seen, mask in zip(self.views, counts or (None,) * len(self.views), codes, masks, strict=True):
@@ -54,7 +54,7 @@ class ArmsInViews:
                 found.append(view.learnt(known, seen, thinned(mask), pose))
         return tuple(found)
 
-    def uncovered(self, counts: Counts, codes: Sequence[Codes | None], masks: Sequence[Mask | None], last: Array) -> Cost | None:
+    def uncovered(self, counts: Counts, codes: Sequence[ColourCode | None], masks: Sequence[Mask | None], last: Array) -> Cost | None:
         """The pixels of a frame's masks (H, W) that have the colours of arms and that the arms of poses (N, D) do not cover, as shares (N,)
         of the silhouettes' area; None if nothing has these colours. `last`: the pose (D,) in the frame before."""
         seen, area = list[tuple[Picture, NDArray[np.int64], Bits]](), 0

@@ -13,7 +13,7 @@ import numpy as np
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.bits import pack
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.colour_codes import Codes
+from shadowpuppet.camera.colour_codes import ColourCode
 from shadowpuppet.camera.mask import Mask, half_size
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
@@ -93,7 +93,7 @@ class MultiviewTracker:
     """Surface points of masks (H, W), one per camera: computed again without a camera that contradicts the others; None: all count."""
 
     def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
-             also: Cost | None = None, codes: Sequence[Codes | None] = ()) -> MultiviewState:
+             also: Cost | None = None, codes: Sequence[ColourCode | None] = ()) -> MultiviewState:
         """The state after a new frame's surface points, and the masks (H, W) that they were made from, one per camera.
 
         If no person is visible the pose is held; after a loss the person is searched for (`recover`). `also`: a cost of your own, poses
@@ -139,7 +139,7 @@ class MultiviewTracker:
         return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent")
 
     def observe(self, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
-                also: Cost | None = None, codes: Sequence[Codes | None] = ()) -> MultiviewObservation:
+                also: Cost | None = None, codes: Sequence[ColourCode | None] = ()) -> MultiviewObservation:
         """The observation of a frame's masks (H, W) after `state`, without what is left out beside its pose. Arguments as in `step`."""
         also = self._with_arms(also, state, masks, codes)
         beside = [None if each is None else each.beside(picture.mask(state.pose))
@@ -147,7 +147,7 @@ class MultiviewTracker:
         return MultiviewObservation(self.views, points, masks, also, [None if pixels is None else pack(pixels) for pixels in beside])
 
     def _with_arms(self, also: Cost | None, state: MultiviewState, masks: Sequence[Mask | None],
-                  codes: Sequence[Codes | None]) -> Cost | None:
+                  codes: Sequence[ColourCode | None]) -> Cost | None:
         """A caller's cost with that of what has the arms' colours and that no arm covers. Arguments as in `step`."""
         weight = self.arm_colours
         arms = self.arms_in_views.uncovered(state.colours, codes, masks, state.pose) if weight and state.colours and codes else None
@@ -155,7 +155,7 @@ class MultiviewTracker:
             return also
         return lambda poses: weight * arms(poses) + (0 if also is None else also(poses))
 
-    def learnt(self, colours: Counts, codes: Sequence[Codes | None], masks: Sequence[Mask | None], state: MultiviewState) -> Counts:
+    def learnt(self, colours: Counts, codes: Sequence[ColourCode | None], masks: Sequence[Mask | None], state: MultiviewState) -> Counts:
         """The colours seen so far, with those in a new state's frame, of its masks (H, W), if the estimate fits well."""
         if not codes or state.status != "tracked" or state.overlap < WELL:
             return colours

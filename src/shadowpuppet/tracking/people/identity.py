@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,8 @@ SETTLED = 3.0
 class Question(NamedTuple):
     """Two people who may have been exchanged."""
 
+    pair: tuple[int, int]
+    """Their numbers, the lower first."""
     begin: float
     """When they came close, or one of them was found again; seconds."""
     close: float
@@ -43,20 +45,19 @@ class Exchange(NamedTuple):
     other: int
 
 
-@dataclass
-class Clothes:
+class Clothes(NamedTuple):
     """The colours of one person."""
 
     known: Colours | None = None
-    """Gathered while it was certain who they are."""
-    recent: list[tuple[float, Colours]] = field(default_factory=list)
+    """Gathered while it was certain whose they are."""
+    recent: tuple[tuple[float, Colours], ...] = ()
     """Gathered since, with the time (s) of each."""
 
-    def settle(self, until: float = np.inf) -> None:
-        """What was seen until a time (s) is this person's own."""
-        for _, colours in (own := [each for each in self.recent if each[0] <= until]):
-            self.known = colours.copy() if self.known is None else self.known + colours
-        self.recent = self.recent[len(own) :]
+    def settled(self, until: float = np.inf) -> Clothes:
+        """The same once what was seen until a time (s) is this person's own."""
+        own = [colours for time, colours in self.recent if time <= until]
+        known = own if self.known is None else [self.known, *own]
+        return Clothes(np.add.reduce(known) if known else None, self.recent[len(own) :])
 
     @property
     def now(self) -> Colours | None:
@@ -64,76 +65,72 @@ class Clothes:
         return np.add.reduce([colours for _, colours in self.recent]) if len(self.recent) >= LEAST else None
 
 
-class Identity:
-    """Gathers people's colours, and says who was exchanged. Without colours it says whose identity is in doubt."""
+class Identity(NamedTuple):
+    """People's colours, and the pairs that may have been exchanged. Without colours it says whose identity is in doubt."""
 
-    def __init__(self) -> None:
-        """Nobody has been seen."""
-        self.clothes = dict[int, Clothes]()
-        self.questions = dict[tuple[int, int], Question]()
-        """By the numbers of two people, the lower first."""
+    clothes: Mapping[str, Clothes] = MappingProxyType({})
+    """By the person's number."""
+    questions: tuple[Question, ...] = ()
 
-    def see(self, number: int, time: float, colours: Colours) -> None:
-        """The colours of a person at a time (s), seen apart from others."""
-        clothes = self.clothes.setdefault(number, Clothes())
-        clothes.recent.append((time, colours))
-        if not any(number in pair for pair in self.questions):
-            clothes.settle(time - RECENT)
+    def of(self, number: int) -> Clothes:
+        """The clothes of a person."""
+        return self.clothes.get(str(number), Clothes())
 
-    def meet(self, one: int, other: int, time: float, is_open: bool) -> None:
-        """Two people are close at a time (s), or the one who was found may be the other; `is_open`: motion does not tell who is who."""
-        pair = min(one, other), max(one, other)
-        before = self.questions.get(pair)
-        for number in pair:
-            clothes = self.clothes.setdefault(number, Clothes())
-            if any(number in each for each in self.questions):
-                clothes.recent.clear()
-            else:
-                clothes.settle()
-        self.questions[pair] = Question(time if before is None else before.begin, time, is_open or (before is not None and before.is_open))
+    def is_asked(self, number: int) -> bool:
+        """Whether a person is in a question."""
+        return any(number in question.pair for question in self.questions)
 
     def is_doubted(self, number: int) -> bool:
         """Whether a person may be another one."""
-        return any(question.is_open for pair, question in self.questions.items() if number in pair)
+        return any(question.is_open for question in self.questions if number in question.pair)
+
+    def see(self, number: int, time: float, colours: Colours) -> Identity:
+        """The identity after the colours of a person were seen at a time (s), apart from others."""
+        own = self.of(number)
+        own = own._replace(recent=(*own.recent, (time, colours)))
+        return self._with({number: own if self.is_asked(number) else own.settled(time - RECENT)})
+
+    def meet(self, one: int, other: int, time: float, is_open: bool) -> Identity:
+        """The identity after two people are close at a time (s), or the one found may be the other; `is_open`: motion does not tell."""
+        pair = min(one, other), max(one, other)
+        before = next((each for each in self.questions if each.pair == pair), Question(pair, time, time, False))
+        clothes = {n: self.of(n)._replace(recent=()) if self.is_asked(n) else self.of(n).settled() for n in pair}
+        rest = tuple(each for each in self.questions if each.pair != pair)
+        return self._with(clothes)._replace(questions=(*rest, before._replace(close=time, is_open=is_open or before.is_open)))
 
     def unlike(self, number: int, colours: Colours | None) -> float:
         """How differently a person is dressed from colours; NaN if that is not known."""
-        clothes = self.clothes.get(number)
-        return np.nan if clothes is None or clothes.known is None or colours is None else difference(clothes.known, colours)
+        known = self.of(number).known
+        return np.nan if known is None or colours is None else difference(known, colours)
 
-    def decide(self, time: float, present: Iterable[int]) -> Exchange | None:
-        """Two people who were exchanged, as their colours say at a time (s), of whom at least one is present; questions that are answered
-        are closed."""
-        there = set(present)
-        pairs = {(n, m) for n in there for m in there if n < m} | {pair for pair in self.questions if there & set(pair)}
-        for pair in sorted(pairs):
-            lead = self._lead(pair, there)
-            question = self.questions.get(pair)
+    def decided(self, time: float, present: Iterable[int]) -> tuple[Identity, Exchange | None]:
+        """The identity without the questions that are answered at a time (s), and two people who were exchanged, as their colours say, of
+        whom at least one is present."""
+        there, asked, out = set(present), {each.pair: each for each in self.questions}, self
+        for pair in sorted({(n, m) for n in there for m in there if n < m} | {pair for pair in asked if there & set(pair)}):
+            lead, question = out._lead(pair, there), asked.get(pair)
             if lead < -CLEAR:
-                return self._exchanged(pair, time, question)
+                return out._exchanged(pair, time, question)
             if question is not None and (lead > CLEAR or (not question.is_open and time - question.close > SETTLED)):
-                self._close(pair)
-        return None
+                out = out._closed(pair)
+        return out, None
 
     def _lead(self, pair: tuple[int, int], there: set[int]) -> float:
         """How much better the recent colours of a pair's people who are there fit themselves than each other, for one person; NaN if
         that is not known."""
-        leads = list[float]()
-        for number, other in (pair, pair[::-1]):
-            if number in there:
-                now = self.clothes[number].now if number in self.clothes else None
-                leads.append(self.unlike(other, now) - self.unlike(number, now))
+        leads = [self.unlike(other, self.of(number).now) - self.unlike(number, self.of(number).now)
+                 for number, other in (pair, pair[::-1]) if number in there]  # fmt: skip
         return float(np.mean(leads))
 
-    def _exchanged(self, pair: tuple[int, int], time: float, question: Question | None) -> Exchange:
-        one, other = (self.clothes.setdefault(number, Clothes()) for number in pair)
+    def _exchanged(self, pair: tuple[int, int], time: float, question: Question | None) -> tuple[Identity, Exchange]:
+        one, other = map(self.of, pair)
         begin = min([each[0] for each in (*one.recent, *other.recent)], default=time) if question is None else question.begin
-        one.recent, other.recent = other.recent, one.recent
-        self._close(pair)
-        return Exchange(begin, time, *pair)
+        swapped = {pair[0]: one._replace(recent=other.recent), pair[1]: other._replace(recent=one.recent)}
+        return self._with(swapped)._closed(pair), Exchange(begin, time, *pair)
 
-    def _close(self, pair: tuple[int, int]) -> None:
-        self.questions.pop(pair, None)
-        for number in pair:
-            if not any(number in each for each in self.questions):
-                self.clothes[number].settle()
+    def _closed(self, pair: tuple[int, int]) -> Identity:
+        rest = self._replace(questions=tuple(each for each in self.questions if each.pair != pair))
+        return rest._with({number: rest.of(number).settled() for number in pair if not rest.is_asked(number)})
+
+    def _with(self, clothes: Mapping[int, Clothes]) -> Identity:
+        return self._replace(clothes={**self.clothes, **{str(number): each for number, each in clothes.items()}})

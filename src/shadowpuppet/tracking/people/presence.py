@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from shadowpuppet.geometry import Array
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.tracking.people.appearance import Colours
 from shadowpuppet.tracking.people.figures import Figure
 
 SPEED = 3.0
@@ -28,31 +29,33 @@ CLOSE = 0.7
 """Distance (m) of two figures up to which one may be a part of the other's person: the legs of one who sits or lies."""
 
 
-@dataclass
-class Followed:
+class Sighting(NamedTuple):
+    """A person in a frame set, among others."""
+
+    time: float
+    """Seconds."""
+    figure: Figure
+    others: tuple[Figure, ...]
+    masks: tuple[Mask | None, ...]
+    """Silhouettes (H, W) of all people together, one per camera."""
+    worn: Colours | None = None
+    """Colours of the figure; None without pictures."""
+
+
+class Followed(NamedTuple):
     """A person's figures over time."""
 
-    times: list[float] = field(default_factory=list)
-    """Seconds."""
-    figures: list[Figure] = field(default_factory=list)
-    sets: list[int] = field(default_factory=list)
-    """Number of the frame set of each figure."""
-
-    def add(self, number: int, time: float, figure: Figure) -> None:
-        """The figure of one more frame set, at a time (s)."""
-        self.times.append(time)
-        self.figures.append(figure)
-        self.sets.append(number)
+    sightings: tuple[Sighting, ...]
 
     @property
     def height(self) -> float:
         """Height of the figures, metres, when the person stands upright: few are higher."""
-        return float(np.percentile([figure.height for figure in self.figures], UPRIGHT))
+        return float(np.percentile([each.figure.height for each in self.sightings], UPRIGHT))
 
     @property
-    def place(self) -> Array:
-        """Last place on the floor plan, of shape (2,), metres."""
-        return self.figures[-1].place
+    def last(self) -> Sighting:
+        """The last sighting."""
+        return self.sightings[-1]
 
 
 def sure_number(figures: Sequence[Figure]) -> int:
@@ -76,18 +79,21 @@ def counted(numbers: Sequence[int], share: float = COUNTED) -> int:
     return max((n for n in set(numbers) if sum(each >= n for each in numbers) >= least), default=min(max(numbers, default=0), 1))
 
 
-def follow(before: Sequence[Followed], number: int, time: float, figures: Sequence[Figure]) -> list[Followed]:
-    """The people followed after one more frame set's figures: those of `before`, extended, and the new ones."""
-    people, free = list(before), list(range(len(figures)))
-    pairs = sorted((float(np.linalg.norm(figures[c].place - each.place)), n, c) for n, each in enumerate(people) for c in free)
+def sightings(time: float, figures: Sequence[Figure], masks: Sequence[Mask | None]) -> list[Sighting]:
+    """Each of a frame set's figures, at a time (s), among the others."""
+    return [Sighting(time, one, tuple(other for other in figures if other is not one), tuple(masks)) for one in figures]
+
+
+def follow(before: Sequence[Followed], found: Sequence[Sighting]) -> list[Followed]:
+    """The people followed after one more frame set's sightings: those of `before`, extended, and the new ones."""
+    people, free = list(before), list(range(len(found)))
+    pairs = sorted((float(np.linalg.norm(found[c].figure.place - each.last.figure.place)), n, c)
+                   for n, each in enumerate(people) for c in free)  # fmt: skip
     taken = set[int]()
     for away, n, c in pairs:
-        if n in taken or c not in free or away > NEAR + SPEED * (time - people[n].times[-1]):
+        if n in taken or c not in free or away > NEAR + SPEED * (found[c].time - people[n].last.time):
             continue
-        people[n].add(number, time, figures[c])
+        people[n] = Followed((*people[n].sightings, found[c]))
         taken.add(n)
         free.remove(c)
-    for c in free:
-        people.append(Followed())
-        people[-1].add(number, time, figures[c])
-    return people
+    return [*people, *(Followed((found[c],)) for c in free)]

@@ -28,9 +28,7 @@ from shadowpuppet.tracking.people.evidence import (
     ignored_pixels,
     predicted,
 )
-from shadowpuppet.tracking.people.facing import CLEARLY
 from shadowpuppet.tracking.people.figures import Figure
-from shadowpuppet.tracking.people.walking import TURN
 from shadowpuppet.tracking.recovery import settle
 
 TOUCHING = 0.25
@@ -161,18 +159,6 @@ def shows_side(person: MultiviewTracker, share: Share) -> bool:
     x, y, _, heading = share.state.pose[person.body.skeleton.dof_indices(GLOBAL_DOFS)].tolist()
     ways = [person.cameras[n].centre[:2] - (x, y) for n in views_apart(share)]
     return any(abs(way @ (np.cos(heading), np.sin(heading))) < np.cos(SIDE) * np.linalg.norm(way) for way in ways)
-
-
-def keep_front(person: MultiviewTracker, rng: np.random.Generator, before: MultiviewState, share: Share) -> Share:
-    """The share of a person whose front was known in the state `before`, of the frame beside: facing that way, unless the body turned round
-    fits clearly better."""
-    heading = heading_column(person.body.skeleton)
-    if share.state.status == "lost" or np.cos(share.state.pose[heading] - before.pose[heading]) > np.cos(TURN):
-        return share
-    turned = turn_round(person, rng, share)
-    if turned.status == "lost" or np.nan_to_num(share.state.overlap) - np.nan_to_num(turned.overlap) >= CLEARLY:
-        return share
-    return share._replace(state=turned, drawn=draw_person(person, turned.pose))
 
 
 def observed(person: MultiviewTracker, share: Share) -> PersonObservation:

@@ -8,15 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.bones import BONES
 from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.limbs import DOUBTFUL, LIMBS, limb_of
 from shadowpuppet.motion.mesh import Mesh, body_mesh, bone_mesh
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.viewer.scene.scene import Figure, LimbDoubt
+from shadowpuppet.viewer.scene.scene import LimbDoubt, SceneFigure
 
 DOT = 0.06
 """Length of the mark of a joint without bones, metres."""
@@ -34,11 +34,11 @@ class LimbStatuses(NamedTuple):
 
 
 def animation_figure(name: str, animation: Animation, mesh: Mesh | None = None, kind: str = "estimate",
-                     statuses: LimbStatuses | None = None, **more) -> Figure:
-    """Figure of a moving skeleton with a mesh, by default a stick along every bone. `more`: fields of `Figure`."""
+                     statuses: LimbStatuses | None = None, **more) -> SceneFigure:
+    """Figure of a moving skeleton with a mesh, by default a stick along every bone. `more`: fields of `SceneFigure`."""
     places, turns = animation.world()
     more = {"joints": places, "joint_names": animation.names} | more
-    return Figure(name, animation.times, mesh or bone_mesh(animation), animation.rest, places, turns, kind,
+    return SceneFigure(name, animation.times, mesh or bone_mesh(animation), animation.rest, places, turns, kind,
                   **_of_statuses(animation.names, statuses), **more)
 
 
@@ -56,12 +56,12 @@ def limb_doubt(names: Sequence[str], statuses: LimbStatuses) -> LimbDoubt:
     return LimbDoubt(frames, np.array([LIMBS.index(limb_of(name)) for name in names]))
 
 
-def pose_figure(name: str, body: Body, times: Array, poses: Array, root: Array, kind: str = "estimate") -> Figure:
+def pose_figure(name: str, body: Body, times: Array, poses: Array, root: Array, kind: str = "estimate") -> SceneFigure:
     """Figure of a body in poses (T, D); `root` (4, 4): the body's frame to the world."""
     return animation_figure(name, BodyTree(body).animation(times, poses, root), body_mesh(body), kind)
 
 
-def joint_figure(name: str, table: JointTable, kind: str = "estimate", **more) -> Figure:
+def joint_figure(name: str, table: JointTable, kind: str = "estimate", **more) -> SceneFigure:
     """Figure of joints without a skeleton: a stick for every bone between them, a dot for each other joint. `more`: as of
     `animation_figure`."""
     table = _with_midpoints(table)
@@ -76,7 +76,7 @@ def joint_figure(name: str, table: JointTable, kind: str = "estimate", **more) -
 
 
 def _of_sticks(name: str, times: Array, ends: Sequence[tuple[Array, Array, str]], kind: str,
-               statuses: LimbStatuses | None = None, **more) -> Figure:
+               statuses: LimbStatuses | None = None, **more) -> SceneFigure:
     """Figure of sticks between moving points (T, 3), each of constant length: the median."""
     T, J = len(times), len(ends) + 1
     lengths = [_median(np.linalg.norm(b - a, axis=1)) for a, b, _ in ends]
@@ -89,7 +89,7 @@ def _of_sticks(name: str, times: Array, ends: Sequence[tuple[Array, Array, str]]
     for n, (a, b, _) in enumerate(ends):
         places[:, n + 1], turns[:, n + 1] = a, _rotations_along(b - a)
         places[~np.isfinite(b).all(1), n + 1] = np.nan
-    return Figure(name, times, bone_mesh(frame), np.zeros((J, 3)), places, turns, kind, **_of_statuses(frame.names, statuses), **more)
+    return SceneFigure(name, times, bone_mesh(frame), np.zeros((J, 3)), places, turns, kind, **_of_statuses(frame.names, statuses), **more)
 
 
 def _rotations_along(along: Array) -> Array:

@@ -13,10 +13,10 @@ from shadowpuppet.io.motion.skeletons import ENDINGS as SKELETONS
 from shadowpuppet.io.motion.skeletons import read_animation
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.viewer.scene.figures import animation_figure, joint_figure
-from shadowpuppet.viewer.scene.scene import Scene, SceneCamera
+from shadowpuppet.viewer.scene.scene import SceneCamera, Stage
 
 
-def motion_scene(path: Path, rate: float | None = None) -> Scene:
+def motion_scene(path: Path, rate: float | None = None) -> Stage:
     """The scene of a file of motion that `convert` reads; `rate`: frames/s of an .amc file. Raises `FormatError`."""
     if path.suffix.lower() in SKELETONS:
         animation = read_animation(path, rate)
@@ -29,7 +29,7 @@ def motion_scene(path: Path, rate: float | None = None) -> Scene:
     if not len(times):
         raise FormatError(f"{path}: found no frame in it, expected one at least")
     facts = {"file": str(path), "joints": str(count), "frames": str(len(times))}
-    return Scene(title=path.name, times=times, figures=figures, facts=facts)
+    return Stage(title=path.name, times=times, figures=figures, facts=facts)
 
 
 def _joints(path: Path, rate: float | None) -> JointTable:
@@ -40,13 +40,13 @@ def _joints(path: Path, rate: float | None) -> JointTable:
         return read_motion(path, rate, own_names=True)
 
 
-def calibration_scene(path: Path) -> Scene:
+def calibration_scene(path: Path) -> Stage:
     """The scene of a calibration file. Raises `CalibrationError`."""
     look, found = look_at_calibration(path, None, None)
     cameras = tuple(SceneCamera(camera) for camera in found.cameras)
     oriented = tuple(each for each in cameras if each.camera.oriented)
     if not oriented:
-        raise ShadowPuppetError(f"{path}: found no camera of which it tells where it stands, expected one at least")
+        raise ShadowPuppetError(f"{path}: found no camera with a place, expected one at least")
     labels = () if look.middle is None else (("what all look at", look.middle),)
     facts = {"file": str(path), "kind": look.format, "cameras": ", ".join(each.camera.name for each in cameras), "unit": look.unit}
-    return Scene(title=path.name, times=np.zeros(1), cameras=oriented, labels=labels, facts=facts, notes=look.notes, problems=look.doubts)
+    return Stage(title=path.name, times=np.zeros(1), cameras=oriented, labels=labels, facts=facts, notes=look.notes, problems=look.doubts)

@@ -13,14 +13,14 @@ from shadowpuppet.evaluation.people import known_truths
 from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.viewer.scene.figures import joint_figure
 from shadowpuppet.viewer.scene.of_run import run_scene
-from shadowpuppet.viewer.scene.scene import Chart, Figure, Scene
+from shadowpuppet.viewer.scene.scene import Chart, Stage
 
 TINTS = ((40, 50, 70), (150, 60, 190), (20, 130, 90), (190, 120, 10), (190, 40, 70), (30, 110, 190))
 """Colours mixed into the people's, in order; the seventh person has the first's again."""
 
 
-def people_scene(folder: str | Path, folders: Mapping[int, Path], recording: str | Path | None = None) -> Scene:
-    """The scene of a run of several people, whose runs are in `folders` by number; `recording` replaces that which it names. Raises a
+def people_scene(folder: str | Path, folders: Mapping[int, Path], recording: str | Path | None = None) -> Stage:
+    """The scene of a run of several people, whose runs are in `folders` by number; `recording` replaces the one that it names. Raises a
     `ShadowPuppetError`.
 
     Truths are truth_1.csv, truth_2.csv, ... of the recording. The run with the lowest number gives films and hull points.
@@ -30,7 +30,7 @@ def people_scene(folder: str | Path, folders: Mapping[int, Path], recording: str
     figures = [replace(figure, name=f"person {number}", tint=TINTS[(number - 1) % len(TINTS)])
                for number, scene in scenes.items() for figure in scene.figures if figure.kind == "estimate"]
     try:
-        figures += _truths(Path(folder))
+        figures += [joint_figure(f"truth {n}", read_truth(path), "truth") for n, path in enumerate(known_truths(folder), 1)]
     except ShadowPuppetError as error:
         problems.append(f"no truth is shown: {error}")
     times = np.unique(np.concatenate([scene.times for scene in scenes.values()]).round(6))
@@ -42,12 +42,8 @@ def people_scene(folder: str | Path, folders: Mapping[int, Path], recording: str
                    problems=tuple(dict.fromkeys(problems)))
 
 
-def _truths(folder: Path) -> list[Figure]:
-    return [joint_figure(f"truth {n}", read_truth(path), "truth") for n, path in enumerate(known_truths(folder), 1)]
-
-
-def _overlaps(scenes: Mapping[int, Scene]) -> list[Chart]:
-    """One chart of all people's overlaps, at the times of the first who has one."""
+def _overlaps(scenes: Mapping[int, Stage]) -> list[Chart]:
+    """One chart of all people's overlaps, at the times of the first person with one."""
     own = {number: chart for number, scene in scenes.items() for chart in scene.charts if chart.name == "overlap"}
     if not own:
         return []
@@ -57,6 +53,6 @@ def _overlaps(scenes: Mapping[int, Scene]) -> list[Chart]:
     return [replace(base, curves=curves)]
 
 
-def _others(scenes: Mapping[int, Scene]) -> list[Chart]:
+def _others(scenes: Mapping[int, Stage]) -> list[Chart]:
     return [replace(chart, name=f"person {number}, {chart.name}")
             for number, scene in scenes.items() for chart in scene.charts if chart.name != "overlap"]

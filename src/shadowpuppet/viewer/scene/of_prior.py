@@ -15,7 +15,7 @@ from shadowpuppet.io.prior import read_prior
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.video.frames import ASSUMED_RATE
 from shadowpuppet.viewer.scene.figures import pose_figure
-from shadowpuppet.viewer.scene.scene import Figure, Scene
+from shadowpuppet.viewer.scene.scene import SceneFigure, Stage
 
 SECONDS = 10.0
 """Length of the sampled motion."""
@@ -25,7 +25,7 @@ SETTLED = 1 << 20
 """Steps after which the Markov chain is stationary."""
 
 
-def prior_scene(path: Path, seed: int = 0) -> Scene:
+def prior_scene(path: Path, seed: int = 0) -> Stage:
     """The scene of a prior saved by `fit-prior`. Raises `FormatError`, also if no body has its degrees of freedom."""
     prior = read_prior(path)
     body = body_of(path, prior)
@@ -41,9 +41,9 @@ def prior_scene(path: Path, seed: int = 0) -> Scene:
         labels.append((f"{n + 1}: {100 * shares[n]:.0f} %", (place[0], place[1], 2.05)))
     facts = {"prior": str(path), "body": body.name, "regions": f"{len(shares)}, the mean posture of each, and the share of time in it",
              "rate": f"{rate:g} frames/s"}  # fmt: skip
-    return Scene(title=path.name, times=times, figures=(walker, *means), labels=tuple(labels), facts=facts,
-                notes=("Who moves is drawn at random from the prior alone, frame by frame, as the tracker proposes poses before it "
-                       "looks: no one's recorded motion.",))  # fmt: skip
+    return Stage(title=path.name, times=times, figures=(walker, *means), labels=tuple(labels), facts=facts,
+                notes=("The moving figure is drawn at random from the prior alone, frame by frame, as the tracker proposes poses before "
+                       "it weighs them: it is no recorded motion.",))  # fmt: skip
 
 
 def body_of(path: Path, prior: MotionPrior) -> Body:
@@ -85,7 +85,7 @@ def stationary_shares(prior: MotionPrior) -> Array:
     return share / share.sum()
 
 
-def _still(name: str, body: Body, pose: Array, place: tuple[float, float, float]) -> Figure:
+def _still(name: str, body: Body, pose: Array, place: tuple[float, float, float]) -> SceneFigure:
     root = np.eye(4)
     root[:3, 3] = place
     return pose_figure(name, body, np.zeros(1), pose[None], root, "mean")

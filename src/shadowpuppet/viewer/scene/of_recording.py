@@ -17,17 +17,17 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video.frames import ASSUMED_RATE
 from shadowpuppet.viewer.scene.figures import joint_figure
 from shadowpuppet.viewer.scene.film_images import FilmImages, hull_function
-from shadowpuppet.viewer.scene.scene import Figure, Scene, SceneCamera
+from shadowpuppet.viewer.scene.scene import SceneCamera, SceneFigure, Stage
 
 
-def recording_scene(path: str | Path, options: Options) -> Scene:
+def recording_scene(path: str | Path, options: Options) -> Stage:
     """The scene of a recording folder, or of a film with a field of view. Raises a `ShadowPuppetError`."""
     recording = open_recording(path, options)
     cameras, footage, ready = cameras_of(recording, options)
     figures, problems = _truth(recording)
     made = "ready, from masks/" if ready else "made as `track` makes them"
     facts = {"recording": str(recording.path), "cameras": ", ".join(each.camera.name for each in cameras), "silhouettes": made}
-    return Scene(title=recording.name, times=frame_times(footage), figures=figures, cameras=cameras, hull=hull_function(cameras, options),
+    return Stage(title=recording.name, times=frame_times(footage), figures=figures, cameras=cameras, hull=hull_function(cameras, options),
                  facts=facts, problems=problems)
 
 
@@ -50,7 +50,7 @@ def frame_times(footage: Sequence[Footage]) -> Array:
     return footage[n].recording.begin + np.arange(max(count, 1)) / rates[n]
 
 
-def _truth(recording: Recording) -> tuple[tuple[Figure, ...], tuple[str, ...]]:
+def _truth(recording: Recording) -> tuple[tuple[SceneFigure, ...], tuple[str, ...]]:
     if recording.truth is None:
         return (), ()
     try:

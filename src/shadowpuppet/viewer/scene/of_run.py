@@ -28,7 +28,7 @@ from shadowpuppet.viewer.scene.figures import LimbStatuses, animation_figure, jo
 from shadowpuppet.viewer.scene.film_images import hull_function
 from shadowpuppet.viewer.scene.of_recording import cameras_of
 from shadowpuppet.viewer.scene.particles import ParticleRerun
-from shadowpuppet.viewer.scene.scene import Chart, Figure, Scene, SceneCamera
+from shadowpuppet.viewer.scene.scene import Chart, SceneCamera, SceneFigure, Stage
 
 LIMBS = ("left_arm", "right_arm", "left_leg", "right_leg")
 OF_LIMBS = {"arm": ("shoulder", "elbow", "wrist", "arm", "forearm", "hand"), "leg": ("hip", "knee", "ankle", "leg")}
@@ -36,9 +36,9 @@ OF_LIMBS = {"arm": ("shoulder", "elbow", "wrist", "arm", "forearm", "hand"), "le
 UNSTATED = "This run states no standard deviations: no intervals are shown."
 
 
-def run_scene(folder: str | Path, truth: str | Path | None = None, recording: str | Path | None = None, *, films: bool = True) -> Scene:
-    """The scene of a run folder; `truth` and `recording` replace those that it names; without `films` the cameras are those that the folder
-    keeps. Raises a `ShadowPuppetError`.
+def run_scene(folder: str | Path, truth: str | Path | None = None, recording: str | Path | None = None, *, films: bool = True) -> Stage:
+    """The scene of a run folder; `truth` and `recording` replace the ones that it names; without `films` the cameras are the folder's
+    own. Raises a `ShadowPuppetError`.
 
     Files that it names and that are gone are left out and named in `problems`.
     """
@@ -54,7 +54,7 @@ class _Run:
     recording: str | Path | None
     with_films: bool = True
 
-    def scene(self) -> Scene:
+    def scene(self) -> Stage:
         motion, problems = self.run.motion, list[str]()
         if not len(motion):
             raise ShadowPuppetError(f"{self.run.folder}: found no frame in it, expected one at least")
@@ -70,7 +70,7 @@ class _Run:
         cameras = filmed if filmed is not None else self.kept_cameras
         cloud = self._tried(problems, "particles are not shown", lambda: self.rerun(cameras)) if films and body is not None else None
         charts = [*(errors_of(measured) if measured is not None else ()), *fit_of(motion), *angles_of(motion)]
-        return Scene(title=self.name, times=motion.times, figures=tuple(figures), cameras=cameras, charts=tuple(charts), facts=self.facts,
+        return Stage(title=self.name, times=motion.times, figures=tuple(figures), cameras=cameras, charts=tuple(charts), facts=self.facts,
                     hull=hull_function(cameras, self.options) if films else None, cloud=cloud, problems=tuple(problems),
                     notes=() if np.isfinite(motion.joint_sd).any() else (UNSTATED,))
 
@@ -110,7 +110,7 @@ class _Run:
         return body
 
     @cached_property
-    def puppet(self) -> Figure:
+    def puppet(self) -> SceneFigure:
         """The body in its poses."""
         animation, _ = motion_animation(self.body, self.run.motion)
         return animation_figure(self.name, animation, body_mesh(self.body), **self.known)
@@ -195,7 +195,7 @@ def _limb(name: str) -> str:
     return "trunk and head"
 
 
-def side_by_side(left: Scene, right: Scene, apart: float = 1.5) -> Scene:
+def side_by_side(left: Stage, right: Stage, apart: float = 1.5) -> Stage:
     """Two scenes as one; the figures of the second are moved `apart` metres to the side, its curves are added to the first's charts."""
     moved = tuple(float(value) for value in apart * _rightward(left))
     others = tuple(replace(figure, name=f"{figure.name}, beside", kind="other" if figure.kind == "estimate" else figure.kind, shift=moved)
@@ -223,7 +223,7 @@ def _joined(one: Chart | None, other: Chart) -> Chart:
     return replace(one, curves={**one.curves, **resampled(curves)}, sd={**one.sd, **resampled(sd)})
 
 
-def _rightward(scene: Scene) -> Array:
+def _rightward(scene: Stage) -> Array:
     """Horizontal unit vector (3,) to the right in the first view."""
     ahead = scene.middle - scene.viewpoint
     right = np.array([ahead[1], -ahead[0], 0.0])

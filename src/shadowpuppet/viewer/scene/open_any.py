@@ -19,11 +19,11 @@ from shadowpuppet.viewer.scene.of_people import people_scene
 from shadowpuppet.viewer.scene.of_prior import prior_scene
 from shadowpuppet.viewer.scene.of_recording import recording_scene
 from shadowpuppet.viewer.scene.of_run import run_scene
-from shadowpuppet.viewer.scene.scene import Scene
+from shadowpuppet.viewer.scene.scene import Stage
 
 
-def open_scene(path: str | Path, options: Options | None = None, truth: Path | None = None, recording: Path | None = None) -> Scene:
-    """The scene of a path. `options`: of recordings and films; `truth` and `recording`: replace those that a run names.
+def open_scene(path: str | Path, options: Options | None = None, truth: Path | None = None, recording: Path | None = None) -> Stage:
+    """The scene of a path. `options`: of recordings and films; `truth` and `recording`: replace the ones that a run names.
 
     Raises a `ShadowPuppetError` if it cannot be shown or read.
     """
@@ -60,7 +60,7 @@ def is_prior(path: Path) -> bool:
         return False
 
 
-def cut_scene(scene: Scene, start: float | None, end: float | None) -> Scene:
+def cut_scene(scene: Stage, start: float | None, end: float | None) -> Stage:
     """The part of a scene from `start` to `end`, seconds. Raises `ShadowPuppetError` if it is empty."""
     low, high = (-np.inf if start is None else start), (np.inf if end is None else end)
     kept = scene.times[(scene.times >= low - 1e-6) & (scene.times <= high + 1e-6)]
@@ -70,7 +70,7 @@ def cut_scene(scene: Scene, start: float | None, end: float | None) -> Scene:
     return replace(scene, times=kept)
 
 
-def _of_folder(path: Path, options: Options) -> Scene:
+def _of_folder(path: Path, options: Options) -> Stage:
     made = is_recording(path)
     if not made and is_calibration(path):
         return calibration_scene(path)

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from shadowpuppet.body.bones import BONES
 from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, align

@@ -14,7 +14,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS
 from shadowpuppet.motion.mesh import Mesh
-from shadowpuppet.motion.synchronization import step_of
+from shadowpuppet.motion.synchronization import nearest, step_of
 from shadowpuppet.video import Image
 
 REACH = 0.75
@@ -55,7 +55,7 @@ class HullPoints(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Figure:
+class SceneFigure:
     """A moving figure: a mesh, each point attached to a joint."""
 
     name: str
@@ -97,8 +97,7 @@ class Figure:
         """Frame to be shown at a time, seconds; None if none is near enough or no joint is known in it."""
         if len(self.times) == 1:
             return 0 if self.known[0] else None
-        after = int(np.clip(np.searchsorted(self.times, time), 1, len(self.times) - 1))
-        n = after - 1 if abs(self.times[after - 1] - time) <= abs(self.times[after] - time) else after
+        n = int(nearest(self.times, np.array(time)))
         return n if abs(self.times[n] - time) <= REACH * self.step and self.known[n] else None
 
     @cached_property
@@ -161,13 +160,13 @@ class Chart:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Scene:
+class Stage:
     """Everything to be shown. Functions are called for one frame at a time, and are slow."""
 
     title: str
     times: Array
     """Frames of the timeline, seconds, of shape (T,)."""
-    figures: tuple[Figure, ...] = ()
+    figures: tuple[SceneFigure, ...] = ()
     cameras: tuple[SceneCamera, ...] = ()
     charts: tuple[Chart, ...] = ()
     hull: Callable[[float], HullPoints] | None = None
@@ -181,7 +180,7 @@ class Scene:
     notes: tuple[str, ...] = ()
     """Remarks for the user, a sentence each."""
     problems: tuple[str, ...] = ()
-    """What could not be shown and why, a sentence each."""
+    """Parts that could not be shown, and reasons, a sentence each."""
 
     @cached_property
     def box(self) -> tuple[Array, Array]:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.intervals import HALF_WIDTH
 from shadowpuppet.motion.motion import STATUSES
-from shadowpuppet.motion.synchronization import step_of
-from shadowpuppet.viewer.scene.scene import Chart, Figure, Scene
+from shadowpuppet.motion.synchronization import nearest, step_of
+from shadowpuppet.viewer.scene.scene import Chart, SceneFigure, Stage
 
 APART = 0.25
 """Seconds without doubt that end a doubtful moment."""
@@ -38,14 +38,14 @@ class Strip(NamedTuple):
         return np.asarray((self.status > STATUSES.index("tracked")).any(1))
 
 
-def strips_of(scene: Scene) -> list[Strip]:
+def strips_of(scene: Stage) -> list[Strip]:
     """A strip for each figure that has statuses."""
     figures = [figure for figure in scene.figures if figure.status is not None]
     charts = {chart.name: chart for chart in scene.charts}
     return [_strip(scene, figure, charts.get("error"), k) for k, figure in enumerate(figures)]
 
 
-def doubtful_moments(scene: Scene) -> list[int]:
+def doubtful_moments(scene: Stage) -> list[int]:
     """Frames of the timeline at which doubtful moments begin."""
     doubtful = [strip.doubtful for strip in strips_of(scene)]
     frames = np.flatnonzero(np.logical_or.reduce(doubtful)) if doubtful else np.zeros(0, int)
@@ -54,14 +54,11 @@ def doubtful_moments(scene: Scene) -> list[int]:
 
 def nearest_frames(times: Array, wanted: Array) -> NDArray[np.int64]:
     """Index of the nearest of `times` (K,), seconds, for each of `wanted` (T,); -1 where none is within a step."""
-    last = len(times) - 1
-    after = np.clip(np.searchsorted(times, wanted), 0, last)
-    before = np.maximum(after - 1, 0)
-    nearest = np.where(np.abs(times[before] - wanted) <= np.abs(times[after] - wanted), before, after)
-    return np.where(np.abs(times[nearest] - wanted) <= step_of(times), nearest, -1)
+    found = nearest(times, wanted)
+    return np.where(np.abs(times[found] - wanted) <= step_of(times), found, -1)
 
 
-def _strip(scene: Scene, figure: Figure, errors: Chart | None, k: int) -> Strip:
+def _strip(scene: Stage, figure: SceneFigure, errors: Chart | None, k: int) -> Strip:
     assert figure.status is not None
     frames = nearest_frames(figure.times, scene.times)
     limbs = figure.limbs if figure.limb_status is not None else ("whole body",)
@@ -83,7 +80,7 @@ def _at(values: Array, frames: NDArray[np.int64]) -> Array:
     return np.where(frames < 0, np.nan, values[frames])
 
 
-def _errors(scene: Scene, errors: Chart | None, k: int) -> Array:
+def _errors(scene: Stage, errors: Chart | None, k: int) -> Array:
     """Errors of the k-th figure at the timeline's frames: the first curve is the first's, `mean, beside` the second's."""
     name = ("mean", "mean, beside")[k] if k < 2 else ""
     if errors is None or name not in errors.curves or not len(errors.times):

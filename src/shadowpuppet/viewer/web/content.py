@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.intervals import HALF_WIDTH
 from shadowpuppet.motion.motion import STATUSES
-from shadowpuppet.viewer.scene.colours import mesh_colours
-from shadowpuppet.viewer.scene.scene import Chart, Figure, Scene, SceneCamera
+from shadowpuppet.viewer.scene.scene import Chart, SceneCamera, SceneFigure, Stage
 from shadowpuppet.viewer.scene.strip import Strip, doubtful_moments, strips_of
 from shadowpuppet.viewer.web.frustum_images import Undistorter
 
@@ -28,7 +27,7 @@ BY_CAMERA = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "
 NOTHING = "'none'"
 
 
-def page_text(scene: Scene, cameras: Sequence[Undistorter], images: Sequence[Sequence[str]] | None, pictures: bool,
+def page_text(scene: Stage, cameras: Sequence[Undistorter], images: Sequence[Sequence[str]] | None, pictures: bool,
               frames: NDArray[np.int64] | None = None) -> str:
     """The page of a scene.
 
@@ -62,9 +61,9 @@ def _hash(text: str) -> str:
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 
 
-def content(scene: Scene, cameras: Sequence[Undistorter], images: Sequence[Sequence[str]] | None, pictures: bool,
+def content(scene: Stage, cameras: Sequence[Undistorter], images: Sequence[Sequence[str]] | None, pictures: bool,
             frames: NDArray[np.int64]) -> dict[str, Any]:
-    """What the page's scripts draw, for JSON; arguments as of `page_text`."""
+    """A scene for the page's scripts, as JSON; arguments as of `page_text`."""
     times = scene.times[frames]
     low, high = scene.box
     return {
@@ -82,7 +81,7 @@ def content(scene: Scene, cameras: Sequence[Undistorter], images: Sequence[Seque
     }  # fmt: skip
 
 
-def _figure(figure: Figure, times: Array) -> dict[str, Any]:
+def _figure(figure: SceneFigure, times: Array) -> dict[str, Any]:
     """A figure at the page's frames: its mesh, and where its joints are in each of its own frames that is shown."""
     mesh = figure.mesh
     found = motion_content(figure, times) | {
@@ -99,7 +98,7 @@ def _figure(figure: Figure, times: Array) -> dict[str, Any]:
         "joints": packed(mesh.joints, "f4"), "limbs": packed(limbs, "f4")}}  # fmt: skip
 
 
-def motion_content(figure: Figure, times: Array) -> dict[str, Any]:
+def motion_content(figure: SceneFigure, times: Array) -> dict[str, Any]:
     """What `Stage.move` takes: the figure's own frame at each of the times (s), -1 for none, and the joints in these frames, for JSON."""
     shown = np.array([-1 if (n := figure.at(float(time))) is None else n for time in times])
     used, index = np.unique(shown[shown >= 0], return_inverse=True)
@@ -143,3 +142,17 @@ def packed(values: ArrayLike, kind: str) -> dict[str, str]:
     if kind[0] in "iu" and array.dtype.kind == "f":
         array = np.nan_to_num(array).round()
     return {"type": kind, "data": base64.b64encode(np.ascontiguousarray(array, f"<{kind}").tobytes()).decode()}
+
+
+MIXED = {"estimate": ((0, 0, 0), 0.0), "truth": ((0, 0, 0), 0.0), "other": ((112, 64, 170), 0.35), "mean": ((150, 156, 164), 0.35)}
+"""Colour mixed into the colour of a kind of figure, and its share."""
+TINT = 0.5
+"""Share of a person's own tint."""
+
+
+def mesh_colours(figure: SceneFigure) -> Array:
+    """Colours of the points of a figure's mesh, sRGB, 0..255, of shape (V, 3)."""
+    linear = np.clip(figure.mesh.colours, 0, 1)
+    own = 255 * np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    mixed, share = MIXED[figure.kind] if figure.tint is None else (figure.tint, TINT)
+    return np.asarray(((1 - share) * own + share * np.array(mixed)).round())

@@ -10,13 +10,13 @@ import numpy as np
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.live.display.drawing import drawn, jpeg
-from shadowpuppet.live.display.view import View
+from shadowpuppet.live.display.view import SessionState
 from shadowpuppet.live.display.web import WebDisplay
 from shadowpuppet.motion.body_animation import BodyTree
 from shadowpuppet.motion.limbs import limb_of, limbs_of
 from shadowpuppet.motion.mesh import body_mesh
 from shadowpuppet.viewer.scene.figures import LimbStatuses, animation_figure
-from shadowpuppet.viewer.scene.scene import Figure, Scene, SceneCamera
+from shadowpuppet.viewer.scene.scene import SceneCamera, SceneFigure, Stage
 from shadowpuppet.viewer.web.content import content, motion_content, script_text
 from shadowpuppet.viewer.web.frustum_images import Undistorter
 
@@ -32,7 +32,7 @@ class SpaceDisplay(WebDisplay):
 
     _space: LiveSpace | None = None
 
-    def figures(self, view: View) -> dict[str, Any]:
+    def figures(self, view: SessionState) -> dict[str, Any]:
         """The figures of a view and, with a measured person, `space`, the number of its scene, and `puppet`, the body's pose in it."""
         if (space := self._space_of(view)) is None:
             return super().figures(view)
@@ -49,7 +49,7 @@ class SpaceDisplay(WebDisplay):
             return json.dumps(space.content(view), allow_nan=False).encode(), "application/json"
         return space.image(view), "image/jpeg"
 
-    def _space_of(self, view: View) -> LiveSpace | None:
+    def _space_of(self, view: SessionState) -> LiveSpace | None:
         """The scene of a view's person: a new one, with a new number, whenever the person is measured again."""
         if not view.pictures:
             return None
@@ -71,18 +71,18 @@ class LiveSpace:
         self._tree, self._mesh = BodyTree(self.body), body_mesh(self.body)
         self._lenses = [Undistorter(each.camera, WIDTH) for each in pictures]
 
-    def content(self, view: View) -> dict[str, Any]:
-        """What the stage draws, for JSON: the body as in a view, or at rest, and the cameras."""
+    def content(self, view: SessionState) -> dict[str, Any]:
+        """The scene for the page's stage, as JSON: the body as in a view, or at rest, and the cameras."""
         rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))[0]
         figure = self.figure(rest if view.pose is None else view.pose)
-        scene = Scene(title="live", times=NOW, figures=(figure,), cameras=self._cameras)
+        scene = Stage(title="live", times=NOW, figures=(figure,), cameras=self._cameras)
         return content(scene, self._lenses, None, True, np.arange(1)) | {"number": self.number, "film": len(self._cameras) == 1}
 
-    def puppet(self, view: View) -> dict[str, Any] | None:
+    def puppet(self, view: SessionState) -> dict[str, Any] | None:
         """The body's motion for the stage; None without a trustworthy pose."""
         return None if view.pose is None else motion_content(self.figure(view.pose, view.doubtful), NOW)
 
-    def figure(self, pose: Array, doubtful: frozenset[str] = frozenset()) -> Figure:
+    def figure(self, pose: Array, doubtful: frozenset[str] = frozenset()) -> SceneFigure:
         """The body in a pose (D,), the limbs of `doubtful` landmarks pale."""
         names = self.body.landmark_names
         limbs, pale = limbs_of(names), {limb_of(name) for name in names if name in doubtful}
@@ -90,11 +90,11 @@ class LiveSpace:
         animation = self._tree.animation(NOW, np.asarray(pose, float)[None], self._root)
         return animation_figure(self.body.name, animation, self._mesh, statuses=statuses)
 
-    def image(self, view: View) -> bytes:
+    def image(self, view: SessionState) -> bytes:
         """The only camera's picture with the silhouette's outline, undistorted, as JPEG; empty without a picture."""
         import cv2
 
-        image = drawn(View(phase=view.phase, trouble=view.trouble, image=view.image, mask=view.mask))
+        image = drawn(SessionState(phase=view.phase, trouble=view.trouble, image=view.image, mask=view.mask))
         if image is None:
             return b""
         full = np.asarray(cv2.resize(image, self._cameras[0].camera.size, interpolation=cv2.INTER_AREA), np.uint8)

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.motion.synchronization import step_of
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.threads import usable_cores
-from shadowpuppet.viewer.scene.scene import CameraImages, Scene
+from shadowpuppet.viewer.scene.scene import CameraImages, Stage
 from shadowpuppet.viewer.web.content import page_text
 from shadowpuppet.viewer.web.frustum_images import Undistorter, camera_image
 
@@ -35,7 +36,7 @@ def check_page(path: Path) -> None:
         raise ShadowPuppetError(f"{path}: cannot be written (there is no folder {path.parent})")
 
 
-def write_page(path: str | Path, scene: Scene, pictures: bool = False, listener: Listener | None = None) -> Path:
+def write_page(path: str | Path, scene: Stage, pictures: bool = False, listener: Listener | None = None) -> Path:
     """Write a scene as one file, with pictures of people only if `pictures`, else silhouettes. Raises `ShadowPuppetError` if it cannot be
     written."""
     path, listener = Path(path), listener or Listener()
@@ -58,7 +59,7 @@ def kept_frames(times: Array) -> NDArray[np.int64]:
     """Indices of the frames in a file: all, or every Nth for at most `MAX_RATE`."""
     if len(times) < 2:
         return np.arange(len(times))
-    every = max(int(np.ceil(1 / (MAX_RATE * float(np.median(np.diff(times)))) - 1e-6)), 1)
+    every = max(int(np.ceil(1 / (MAX_RATE * step_of(times)) - 1e-6)), 1)
     return np.arange(0, len(times), every)
 
 

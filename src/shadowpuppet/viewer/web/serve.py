@@ -15,7 +15,7 @@ from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.network import is_loopback, open_page, page_headers, shown_host
 from shadowpuppet.page_server import PageHandler, PageServer
-from shadowpuppet.viewer.scene.scene import Scene
+from shadowpuppet.viewer.scene.scene import Stage
 from shadowpuppet.viewer.web.content import page_text
 from shadowpuppet.viewer.web.frustum_images import Undistorter
 from shadowpuppet.viewer.web.page import encoded_image
@@ -29,10 +29,10 @@ POINTS, PARTICLES = 2400, 150
 
 
 class ScenePage:
-    """What the page of a scene asks for. Thread-safe."""
+    """Answers to the requests of a scene's page. Thread-safe."""
 
-    def __init__(self, scene: Scene) -> None:
-        """Reads no film before it is asked for."""
+    def __init__(self, scene: Stage) -> None:
+        """Reads a film at the first request."""
         self.scene, self.lenses = scene, [Undistorter(each.camera, WIDTH) for each in scene.cameras]
         self._reading = threading.Lock()
 
@@ -42,7 +42,7 @@ class ScenePage:
         return page_text(self.scene, self.lenses, None, pictures=True).encode()
 
     def part(self, path: str) -> tuple[bytes, str] | None:
-        """What is at a path of the server, and its content type; None if it knows no such path. Empty if there is nothing to show:
+        """Content of a path of the server, and its type; None for an unknown path, empty if there is nothing to show:
 
         /image/CAMERA/FRAME/pictures|silhouettes, /hull/FRAME, /particles/FRAME; the latter two are numbers of 32 bits, little-endian.
         """
@@ -97,14 +97,14 @@ def _bytes(values: Array) -> tuple[bytes, str]:
     return np.ascontiguousarray(values, "<f4").tobytes(), "application/octet-stream"
 
 
-class _Server(PageServer):
+class _SceneServer(PageServer):
     def __init__(self, page: ScenePage, listen: str, port: int) -> None:
         self.page = page
-        super().__init__(_Handler, listen, port)
+        super().__init__(_SceneHandler, listen, port)
 
 
-class _Handler(PageHandler):
-    server: _Server  # pyright: ignore[reportIncompatibleVariableOverride]
+class _SceneHandler(PageHandler):
+    server: _SceneServer  # pyright: ignore[reportIncompatibleVariableOverride]
     page_headers = page_headers("base-uri 'none'")  # the page has its own policy inside
 
     def do_GET(self) -> None:
@@ -125,11 +125,11 @@ class _Handler(PageHandler):
 
 
 @contextmanager
-def serving(scene: Scene, listen: str = "127.0.0.1", port: int | None = None) -> Iterator[str]:
+def serving(scene: Stage, listen: str = "127.0.0.1", port: int | None = None) -> Iterator[str]:
     """Serve a scene's page; yields its address. Raises `SettingsError` if the address or port is not free. Warns if other machines can
     reach it."""
     page = ScenePage(scene)
-    server = open_page(lambda tried: _Server(page, listen, tried), listen, port, PORT)
+    server = open_page(lambda tried: _SceneServer(page, listen, tried), listen, port, PORT)
     if not is_loopback(listen):
         warn(f"the page is served at {listen}: everybody who reaches this machine can see what it shows")
     thread = threading.Thread(target=server.serve_forever, name="page", daemon=True)
@@ -142,7 +142,7 @@ def serving(scene: Scene, listen: str = "127.0.0.1", port: int | None = None) ->
         thread.join()
 
 
-def serve_scene(scene: Scene, listen: str = "127.0.0.1", port: int | None = None,
+def serve_scene(scene: Stage, listen: str = "127.0.0.1", port: int | None = None,
                 ready: Callable[[str], None] = lambda address: None) -> None:
     """Serve a scene's page until Ctrl-C. `ready` is called with its address. Raises `SettingsError` if the address or port is not free."""
     with serving(scene, listen, port) as address:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.motion.opensim.coordinates import MODELS, PELVIS_POSITION, Ball, coordinates
-from shadowpuppet.io.motion.opensim.markers import MARKERS, marker_names
+from shadowpuppet.io.motion.opensim.model_writer import MARKERS, marker_names
 from shadowpuppet.io.motion.opensim.mot import Coordinates, read_mot, write_mot
 from shadowpuppet.io.motion.trc import read_trc, write_trc
 from shadowpuppet.io.run import read_run

@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.motion.opensim.body_masses import average_weight, body_masses
 from shadowpuppet.io.motion.opensim.coordinates import coordinates
-from shadowpuppet.io.motion.opensim.markers import marker_names
-from shadowpuppet.io.motion.opensim.model_writer import write_osim
+from shadowpuppet.io.motion.opensim.model_writer import marker_names, write_osim
 from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.animation import Animation
 from shadowpuppet.motion.body_animation import BodyTree, motion_animation

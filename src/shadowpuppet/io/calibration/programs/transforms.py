@@ -42,7 +42,7 @@ def read_transforms(values: dict[str, Any]) -> Drafts:
     drafts: dict[str, Draft] = {}
     for n, (name, frame) in enumerate(zip(_names(values["frames"], poses), values["frames"])):
         drafts.setdefault(name, _draft(f"frame {n}: ", name, {**values, **frame}, poses[n]))
-    note = "lengths of a transforms.json are in a unit of its own: multiply by what the person's true height is over that of `check`"
+    note = "lengths of a transforms.json are in a unit of its own: multiply by the person's true height over the height in `check`"
     return Drafts(tuple(drafts.values()), None, (note,), tuple(unused))
 
 

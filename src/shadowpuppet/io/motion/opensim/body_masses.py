@@ -24,7 +24,7 @@ def average_weight(animation: Animation) -> float:
     return BODY_MASS_INDEX * stature_of(lengths) ** 2
 
 
-class Segment(NamedTuple):
+class BodySegment(NamedTuple):
     """A segment between two points of the skeleton."""
 
     joint: str
@@ -40,17 +40,17 @@ class Segment(NamedTuple):
 
 
 SEGMENTS = (
-    Segment("pelvis", "chest", "pelvis", 0.1182, 0.55, (0.524, 0.477, 0.516)),
-    Segment("chest", "chest", "waist", 0.1549, 0.55, (0.458, 0.369, 0.442)),
-    Segment("chest", "waist", "neck", 0.1571, 0.75, (0.731, 0.478, 0.689)),
-    Segment("neck", "crown", "head", 0.0681, 0.594, (0.346, 0.368, 0.315)),
+    BodySegment("pelvis", "chest", "pelvis", 0.1182, 0.55, (0.524, 0.477, 0.516)),
+    BodySegment("chest", "chest", "waist", 0.1549, 0.55, (0.458, 0.369, 0.442)),
+    BodySegment("chest", "waist", "neck", 0.1571, 0.75, (0.731, 0.478, 0.689)),
+    BodySegment("neck", "crown", "head", 0.0681, 0.594, (0.346, 0.368, 0.315)),
     *(segment for side in SIDES for segment in (
-        Segment(f"{side}_shoulder", f"{side}_shoulder", f"{side}_elbow", 0.0263, 0.576, (0.282, 0.265, 0.153)),
-        Segment(f"{side}_elbow", f"{side}_elbow", f"{side}_wrist", 0.0150, 0.457, (0.269, 0.261, 0.108)),
-        Segment(f"{side}_elbow", f"{side}_wrist", f"{side}_hand", 0.00585, 0.769, (0.580, 0.484, 0.368)),
-        Segment(f"{side}_hip", f"{side}_hip", f"{side}_knee", 0.1447, 0.385, (0.349, 0.347, 0.156)),
-        Segment(f"{side}_knee", f"{side}_knee", f"{side}_ankle", 0.0457, 0.444, (0.263, 0.258, 0.098)),
-        Segment(f"{side}_ankle", f"{side}_heel", f"{side}_toe", 0.0133, 0.421, (0.278, 0.262, 0.132)),
+        BodySegment(f"{side}_shoulder", f"{side}_shoulder", f"{side}_elbow", 0.0263, 0.576, (0.282, 0.265, 0.153)),
+        BodySegment(f"{side}_elbow", f"{side}_elbow", f"{side}_wrist", 0.0150, 0.457, (0.269, 0.261, 0.108)),
+        BodySegment(f"{side}_elbow", f"{side}_wrist", f"{side}_hand", 0.00585, 0.769, (0.580, 0.484, 0.368)),
+        BodySegment(f"{side}_hip", f"{side}_hip", f"{side}_knee", 0.1447, 0.385, (0.349, 0.347, 0.156)),
+        BodySegment(f"{side}_knee", f"{side}_knee", f"{side}_ankle", 0.0457, 0.444, (0.263, 0.258, 0.098)),
+        BodySegment(f"{side}_ankle", f"{side}_heel", f"{side}_toe", 0.0133, 0.421, (0.278, 0.262, 0.132)),
     )),
 )  # fmt: skip
 """Means of women and men (de Leva 1996, table 4); their masses are 1 together. The middle and upper trunk meet at the waist, the middle of

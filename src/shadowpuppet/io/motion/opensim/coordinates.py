@@ -14,7 +14,7 @@ from shadowpuppet.errors import ShadowPuppetError, warn
 from shadowpuppet.geometry import Array, continuous_angles, rotation_about
 from shadowpuppet.motion.animation import Y_UP, Animation
 
-Pair = tuple[float, float]
+Limits = tuple[float, float]
 
 
 class Ball(NamedTuple):
@@ -23,7 +23,7 @@ class Ball(NamedTuple):
     joint: str
     """Joint of the skeleton."""
     names: tuple[str, str, str]
-    limits: tuple[Pair, Pair, Pair]
+    limits: tuple[Limits, Limits, Limits]
     """Usual ranges, degrees; of equivalent triples of angles, the one least outside these is used."""
     signs: tuple[int, int, int] = (1, 1, 1)
 
@@ -40,40 +40,40 @@ class Hinge(NamedTuple):
     """About forward, the rotation follows one about the axis to the left."""
 
 
-Part = Ball | Hinge
+ModelJoint = Ball | Hinge
 TRUNK = ("lumbar_extension", "lumbar_bending", "lumbar_rotation")
 
 
-def _trunk(chest: tuple[str, str, str] = TRUNK) -> tuple[Part, ...]:
+def _trunk(chest: tuple[str, str, str] = TRUNK) -> tuple[ModelJoint, ...]:
     return (Ball("pelvis", ("pelvis_tilt", "pelvis_list", "pelvis_rotation"), ((-90, 90), (-60, 60), (-180, 180))),
             Ball("chest", chest, ((-90, 45), (-60, 60), (-90, 90))))  # fmt: skip
 
 
-def _leg(side: str, knee: int = 1) -> tuple[Part, ...]:
+def _leg(side: str, knee: int = 1) -> tuple[ModelJoint, ...]:
     s, mirror = side[0], 1 if side == "right" else -1
     return (Ball(f"{side}_hip", (f"hip_flexion_{s}", f"hip_adduction_{s}", f"hip_rotation_{s}"), ((-60, 150), (-90, 60), (-75, 75)),
                  (1, mirror, mirror)),
             Hinge(f"{side}_knee", f"knee_angle_{s}", knee), Hinge(f"{side}_ankle", f"ankle_angle_{s}", -1, first=True))  # fmt: skip
 
 
-def _arm(side: str) -> tuple[Part, ...]:
+def _arm(side: str) -> tuple[ModelJoint, ...]:
     s, mirror = side[0], 1 if side == "right" else -1
     return (Ball(f"{side}_shoulder", (f"arm_flex_{s}", f"arm_add_{s}", f"arm_rot_{s}"), ((-80, 150), (-140, 50), (-150, 150)),
                  (1, mirror, mirror)),
             Hinge(f"{side}_elbow", f"elbow_flex_{s}", -1))  # fmt: skip
 
 
-def _sole(side: str) -> tuple[Part, ...]:
+def _sole(side: str) -> tuple[ModelJoint, ...]:
     return (Hinge(f"{side}_ankle", f"subtalar_angle_{side[0]}", 1 if side == "right" else -1, axis="forward"),)
 
 
-NECK: tuple[Part, ...] = (Ball("neck", ("neck_flexion", "neck_bending", "neck_rotation"), ((-90, 60), (-60, 60), (-90, 90))),)
+NECK: tuple[ModelJoint, ...] = (Ball("neck", ("neck_flexion", "neck_bending", "neck_rotation"), ((-90, 60), (-60, 60), (-90, 90))),)
 
 
-class Model(NamedTuple):
+class OsimModel(NamedTuple):
     """A full-body model: its coordinates, and its pelvis' frame."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[ModelJoint, ...]
     """In the order of the file."""
     hip: tuple[float, float, float] | None = None
     """Centre of the right hip in the pelvis' frame of the unscaled model, metres; None: the pelvis' frame is our own joint's."""
@@ -92,12 +92,12 @@ class Model(NamedTuple):
 
 SIDES = ("right", "left")
 """In the models' order."""
-MODELS: dict[str, Model] = {
-    "rajagopal": Model((*_trunk(), *(part for side in SIDES for part in (*_leg(side), *_arm(side)))), (-0.0563, -0.0785, 0.0773), 90.0),
-    "gait2392": Model((*_trunk(), *(part for side in SIDES for part in _leg(side, knee=-1))), (-0.0707, -0.0661, 0.0835), 90.0),
-    "pose2sim": Model((*_trunk(("L5_S1_Flex_Ext", "L5_S1_Lat_Bending", "L5_S1_axial_rotation")), *NECK,
+MODELS: dict[str, OsimModel] = {
+    "rajagopal": OsimModel((*_trunk(), *(part for side in SIDES for part in (*_leg(side), *_arm(side)))), (-0.0563, -0.0785, 0.0773), 90.0),
+    "gait2392": OsimModel((*_trunk(), *(part for side in SIDES for part in _leg(side, knee=-1))), (-0.0707, -0.0661, 0.0835), 90.0),
+    "pose2sim": OsimModel((*_trunk(("L5_S1_Flex_Ext", "L5_S1_Lat_Bending", "L5_S1_axial_rotation")), *NECK,
                        *(part for side in SIDES for part in (*_leg(side), *_arm(side)))), (-0.0707, -0.0661, 0.0835)),
-    "own": Model((*_trunk(), *NECK, *(part for side in SIDES for part in (*_leg(side), *_sole(side), *_arm(side))))),
+    "own": OsimModel((*_trunk(), *NECK, *(part for side in SIDES for part in (*_leg(side), *_sole(side), *_arm(side))))),
 }  # fmt: skip
 """Models by name: Rajagopal et al. (2016), Delp et al. (1990) as gait2392 (legs and trunk; a bent knee is negative), Pose2Sim's full-body
 model, and the one that `write_osim` makes. Else positive: a knee bends, an ankle bends up; hips and arms move forward, inward, and rotate

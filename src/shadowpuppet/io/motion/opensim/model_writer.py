@@ -6,6 +6,7 @@ TRC file finds the same angles.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -17,10 +18,25 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import euler_angles
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.opensim.body_masses import Mass, average_weight, body_masses
-from shadowpuppet.io.motion.opensim.coordinates import MODELS, PELVIS_POSITION, SIDES, TO_MODEL, Ball, Hinge, Part
-from shadowpuppet.io.motion.opensim.markers import MARKERS
-from shadowpuppet.motion.animation import Animation
+from shadowpuppet.io.motion.opensim.coordinates import MODELS, PELVIS_POSITION, SIDES, TO_MODEL, Ball, Hinge, ModelJoint
+from shadowpuppet.motion.animation import Y_UP, Animation
 from shadowpuppet.motion.body_animation import TO_REST
+from shadowpuppet.motion.motion import JointTable
+
+MARKERS = {
+    "pelvis": "Hip", "neck": "Neck", "head": "HeadBase", "crown": "Head", "nose": "Nose",
+    **{f"{side}_{joint}": f"{side[0].upper()}{name}" for side in ("left", "right") for joint, name in (
+        ("shoulder", "Shoulder"), ("elbow", "Elbow"), ("wrist", "Wrist"), ("hand", "Middle1"), ("hip", "Hip"), ("knee", "Knee"),
+        ("ankle", "Ankle"), ("heel", "Heel"), ("toe", "BigToe"))},
+}  # fmt: skip
+"""Marker names of our joints: those of HALPE_26, Pose2Sim's default. `Head` is the crown there, so the base of the skull has another name;
+hands have the name of Pose2Sim's COCO_133_WRIST."""
+
+
+def marker_names(table: JointTable) -> JointTable:
+    """The table with names of `MARKERS`, rotated so that Y is up, (x, z, -y); joints without such a name keep theirs."""
+    return replace(table, names=tuple(MARKERS.get(name, name) for name in table.names), positions=table.positions @ Y_UP.T)
+
 
 VERSION = "40000"
 """Of OpenSim's file format: read by OpenSim 4.0 and later."""
@@ -48,7 +64,7 @@ def write_osim(path: str | Path, body: Body, animation: Animation, weight: float
     if animation.names[0] != "pelvis" or "right_hip" not in animation.names or body.limbs is None:
         raise ShadowPuppetError(f"{path}: found an upper body ({body.name}), expected a whole body, as an OpenSim model needs: --body "
                                 "anatomical")
-    parts: dict[str, list[Part]] = {}
+    parts: dict[str, list[ModelJoint]] = {}
     for part in MODELS["own"].parts:
         if part.joint in animation.names and _moves(body, part.joint):
             parts.setdefault(part.joint, []).append(part)
@@ -113,7 +129,7 @@ def _shape(components: Element, body: Body, n: int) -> None:
     _text(frame, "orientation", _numbers(euler_angles((to_model @ limbs.rotations[n])[None], (0, 1, 2))[0]))
 
 
-def _joint(joints: Element, joint: str, parts: list[Part], owners: dict[str, str], animation: Animation, body: Body) -> None:
+def _joint(joints: Element, joint: str, parts: list[ModelJoint], owners: dict[str, str], animation: Animation, body: Body) -> None:
     """The joint that moves a body: a ball, a hinge, or an ankle's two."""
     n = animation.names.index(joint)
     above = None if n == 0 else owners[animation.names[animation.parents[n]]]
@@ -156,7 +172,7 @@ def _transform_axis(transform: Element, name: str, coordinate: str, axis: np.nda
         _text(SubElement(each, "Constant", name="function"), "value", "0")
 
 
-def _axes(part: Part) -> list[tuple[str, np.ndarray]]:
+def _axes(part: ModelJoint) -> list[tuple[str, np.ndarray]]:
     """Coordinates of a part, each with the axis (3,), forward, up, right, about which it rotates."""
     forward, up, right = AXES
     if isinstance(part, Ball):
@@ -164,7 +180,7 @@ def _axes(part: Part) -> list[tuple[str, np.ndarray]]:
     return [(part.name, part.sign * (forward if part.axis == "forward" else -right))]
 
 
-def _ranges(part: Part, body: Body) -> list[tuple[str, tuple[float, float]]]:
+def _ranges(part: ModelJoint, body: Body) -> list[tuple[str, tuple[float, float]]]:
     """Coordinates of a part, each with its range, rad: a hinge's by our skeleton's limits."""
     if isinstance(part, Ball):
         return [(name, (float(np.radians(low)), float(np.radians(high)))) for name, (low, high) in zip(part.names, part.limits)]
