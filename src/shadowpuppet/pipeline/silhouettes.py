@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,35 +16,6 @@ from shadowpuppet.silhouette.added import AddedParts, StillParts, find_still
 from shadowpuppet.silhouette.clutter import Clutter, find_clutter
 from shadowpuppet.silhouette.segmenter import Labelled, Segmented
 from shadowpuppet.video import Image
-
-
-class Classified:
-    """Pixels of a film's sampled frames, each classified once however often it is looked at. For several threads."""
-
-    def __init__(self, frames: Iterable[CameraFrame] = ()) -> None:
-        """For the pictures of these frames, which are held until `forget`; any other is classified whenever it is asked for."""
-        self._images = {id(frame.image): frame.image for frame in frames}
-        self._found = dict[int, Labelled]()
-
-    def __reduce__(self) -> tuple[type[Classified], tuple[()]]:
-        """Another process has other frames."""
-        return Classified, ()
-
-    def __call__(self, segmenter: Segmenter, image: Image) -> Labelled:
-        """The pixels of an image, by the one segmenter that these are of."""
-        found = self._found.get(id(image)) or segmenter.labelled(image)
-        if id(image) in self._images:
-            self._found[id(image)] = found
-        return found
-
-    def __bool__(self) -> bool:
-        """Whether there are such frames."""
-        return bool(self._images)
-
-    def forget(self) -> None:
-        """Free the memory: the frames will not be looked at again."""
-        self._images.clear()
-        self._found.clear()
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +36,8 @@ class Silhouettes:
     """What was added to the empty scene, and belongs to the background since."""
     before: Segmenter | None = None
     """The segmenter without what was added."""
-    classified: Classified = field(default_factory=Classified, repr=False)
-    """What the segmenter makes of the sample of the film."""
+    classified: dict[int, tuple[Image, Labelled]] = field(default_factory=dict, repr=False)
+    """Pictures of the film's sample by `id`, with their classified pixels: each is classified once, however often it is looked at."""
 
     @property
     def smeared(self) -> bool:
@@ -83,7 +54,8 @@ class Silhouettes:
         if self.segmenter is None:
             ready = frame.image if frame.ready is None else frame.ready
             return self._kept(Segmented(ready_mask(ready), image=None if frame.ready is None else frame.image))
-        return self._kept(self.segmenter.segmented(self.classified(self.segmenter, frame.image)))
+        _, labelled = self.classified.get(id(frame.image)) or (None, self.segmenter.labelled(frame.image))
+        return self._kept(self.segmenter.segmented(labelled))
 
     def of_several(self) -> Silhouettes:
         """A copy whose masks keep everybody in the picture, not only the largest part."""
@@ -95,7 +67,7 @@ class Silhouettes:
         segmenter = self.before or self.segmenter
         if segmenter is None or (segmenter.covered is None and self.before is None):
             return self(frame)
-        return replace(self, segmenter=replace(segmenter, covered=None), before=None, classified=Classified())(frame)
+        return replace(self, segmenter=replace(segmenter, covered=None), before=None)(frame)
 
     def still_parts(self, frames: Sequence[CameraFrame], masks: Sequence[Mask]) -> StillParts | None:
         """What never changes in frames and their masks (H, W), in the light of the empty scene; None where there is no empty scene, or the

@@ -34,7 +34,7 @@ def names(cautions):
 def test_a_film_that_is_late_by_over_a_frame_is_named(tmp_path, cameras, seen, late, found):
     cautions = said(open_rig(made_rig.write(tmp_path / "r", cameras, made_rig.shifted(seen, late)), MASKS))
     assert names(cautions) == found
-    assert all(each.weight == HARMFUL for each in cautions)
+    assert all(each.severity == HARMFUL for each in cautions)
 
 
 def test_films_shorter_than_what_is_read_tell_nothing(rig_recording, monkeypatch):

@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
-from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -152,9 +151,9 @@ class Outlets(Outlet):
             self._open = opened.pop_all()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: Any) -> None:
         """Close all outlets."""
-        self._open.__exit__(kind, error, trace)
+        self._open.__exit__(*error)
 
     def begin(self, subject: StreamSubject) -> None:
         """Start all outlets with a newly measured person."""

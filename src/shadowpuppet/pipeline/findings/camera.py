@@ -48,11 +48,10 @@ def survey_camera(rig: Rig, options: Options, listener: Listener | None = None, 
     (film,) = films
     steps("silhouettes of the first seconds")
     look = _look(footage, film, options)
-    if look.refusal and not options.anyway:
-        return Survey(rig, (film.silhouettes,), (film.silhouettes,), FirstSeconds([], []), look)
-    clean = clean_silhouettes(footage, film.sample, film.silhouettes, options)
-    first = _first_people(film.sample, clean)
-    film.silhouettes.classified.forget()
+    hopeless = look.refusal is not None and not options.anyway
+    clean = film.silhouettes if hopeless else clean_silhouettes(footage, film.sample, film.silhouettes, options)
+    first = FirstSeconds([], []) if hopeless else _first_people(film.sample, clean)
+    film.silhouettes.classified.clear()
     return Survey(rig, (film.silhouettes,), (clean,), first, look, films=films)
 
 

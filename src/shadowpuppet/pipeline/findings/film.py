@@ -16,7 +16,7 @@ from shadowpuppet.pipeline.footage import LOOKED_AT, Footage, Opening, Sample, t
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
-from shadowpuppet.pipeline.silhouettes import Classified, Silhouettes, learn_silhouettes
+from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.silhouette.added import AddedParts, BesideBody, always_alike, find_added, find_nobody
 from shadowpuppet.silhouette.correction.condition import FilmCondition, film_condition
@@ -91,9 +91,9 @@ def of_several(film: FilmSurvey) -> FilmSurvey:
 
 
 def _made(sample: Sample, silhouettes: Silhouettes) -> tuple[Silhouettes, list[list[Mask]]]:
-    """Silhouettes, which classify each of the sample's frames once, and their masks of its runs."""
-    if not silhouettes.classified:
-        silhouettes = replace(silhouettes, classified=Classified(sample.frames))
+    """Silhouettes, with the sample's frames classified, and their masks of its runs."""
+    if silhouettes.segmenter is not None and not silhouettes.classified:
+        silhouettes.classified.update((id(image), (image, silhouettes.segmenter.labelled(image))) for _, image, _ in sample.frames)
     return silhouettes, [[silhouettes(frame) for frame in run] for run in sample.runs]
 
 
@@ -167,11 +167,13 @@ def quality_of(runs: Sequence[Sequence[Mask]], starts: Sequence[int], ready: boo
     def each(*names: str) -> dict[str, list[float]]:
         return {name: [getattr(part, name) for part in parts] for name in names}
 
+    def first(name: str) -> int | None:
+        return min((start + n for part, start in zip(parts, starts) if (n := getattr(part, name)) is not None), default=None)
+
     means = each("area_jumps", "specks", "speck_area", "holes", "hole_area") | {
         side: [part.border[side] for part in parts] for side in parts[0].border}  # fmt: skip
     mean = {name: float(np.average(values, weights=frames)) for name, values in means.items()}
     median = {name: float(np.median(values)) for name, values in each("area", "area_change", "flicker").items()}
-    first = {name: min((start + n for n, start in zip(values, starts) if n is not None), default=None)
-             for name, values in each("first_empty", "first_full").items()}  # fmt: skip
     return MaskQuality(frames=int(frames.sum()), border={side: mean.pop(side) for side in parts[0].border}, ready=ready,
-                       empty=sum(part.empty for part in parts), full=sum(part.full for part in parts), **mean, **median, **first)
+                       empty=sum(part.empty for part in parts), full=sum(part.full for part in parts),
+                       first_empty=first("first_empty"), first_full=first("first_full"), **mean, **median)

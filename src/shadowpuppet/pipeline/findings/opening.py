@@ -29,9 +29,9 @@ def opening_of(rig: Rig) -> Opening:
 
 
 def first_seconds(rig: Rig, silhouettes: Sequence[Silhouettes], samples: Sequence[Sample], opening: Opening, ready: bool) -> FirstSeconds:
-    """Silhouettes of the opening's frame sets, of the frames that the samples kept of it; films that are not in step, and `ready`
-    silhouettes, are read once more."""
-    kept = None if ready else kept_sets(rig, samples, opening)
+    """Silhouettes of the opening's frame sets, of the frames that the samples kept of it; films that are not in step are read once more,
+    with their `ready` silhouettes if these are used."""
+    kept = kept_sets(rig, samples, opening)
     return _read_sets(rig, silhouettes, opening, ready) if kept is None else _segmented(rig, silhouettes, kept)
 
 

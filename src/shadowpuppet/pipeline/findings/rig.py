@@ -93,7 +93,7 @@ def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, fil
                                     "{people} people: one is tracked, others are ignored", NOTED, people=counted))
     look = replace(look, refusal=refusal, findings=() if refusal else tuple(doubts))
     for each in silhouettes:
-        each.classified.forget()
+        each.classified.clear()
     return Survey(rig, silhouettes, silhouettes, first, look, census, apart)
 
 
