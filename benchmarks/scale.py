@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 import smallest
-from shadowpuppet.synthetic.person.dressed import dressed
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
@@ -26,6 +25,7 @@ from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person.mannequin import Kind
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
+from shadowpuppet.synthetic.scene_renderer import dressed
 from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings

@@ -116,8 +116,7 @@ def test_a_preset_measures_as_algorithm_1_is_printed_and_tracks_as_the_papers():
     assert paper.initialization == InitializationSettings()
     found = printed.initialization
     assert (found.share, found.shrink, found.prior_weight, found.posture_weight, found.sweeps) == (1, 1, 0, 0, 1)
-    assert not (found.memory or found.place)
-    assert not (paper.tracker.recover or paper.tracker.motion_blur)
+    assert (found.memory, found.place, paper.tracker.recover, paper.tracker.motion_blur) == (False,) * 4
     assert make_options({"preset": "liu2011_printed", "initialization": {"memory": True}}).initialization.memory
     assert printed.smoothing == ("off", 0.0)
 

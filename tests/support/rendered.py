@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from shadowpuppet.synthetic.person.dressed import dressed
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
@@ -14,6 +13,7 @@ from shadowpuppet.synthetic.movement.resting import PostureName
 from shadowpuppet.synthetic.person.clothes import Clothes
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
+from shadowpuppet.synthetic.scene_renderer import dressed
 from shadowpuppet.synthetic.spec_changes import parse_gestures
 
 

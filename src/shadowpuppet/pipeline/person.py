@@ -138,8 +138,8 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
         return ColouredMask(mask, seen.codes[0] if seen.codes else None)
 
     def next_state(self, rng: np.random.Generator, state: State | None, observation: ColouredMask) -> State | None:
-        """The tracker's state after a mask; None before the first mask that is not empty, and, for a filter that never searches again, before
-        the first that shows a person."""
+        """The tracker's state after a mask; None before the first mask that is not empty, and, for a filter that never searches again,
+        before the first that shows a person."""
         if state is None:
             if not observation.mask.any():
                 return None

@@ -185,7 +185,8 @@ def test_an_arm_s_stage_sees_the_new_torso_and_the_other_arm_as_it_was(monkeypat
 
 
 @pytest.mark.parametrize(("overrides", "evaluations"), [
-    ({}, 600), ({"rank_by": "new"}, 1200), ({"rank_by": "best_new"}, 1200), ({"cycles": 3}, 1800), ({"cycles": 2, "explore": 10}, 1230), ({"stages": ("torso",)}, 200),
+    ({}, 600), ({"rank_by": "new"}, 1200), ({"rank_by": "best_new"}, 1200), ({"cycles": 3}, 1800),
+    ({"cycles": 2, "explore": 10}, 1230), ({"stages": ("torso",)}, 200),
 ])  # fmt: skip
 def test_how_many_particles_a_frame_evaluates(monkeypatch, overrides, evaluations):
     """Ranked by known costs, or evaluated again in the new picture (eq. 8 as printed), which doubles the work."""
@@ -214,7 +215,8 @@ def test_every_resampling_follows(resampling):
 @pytest.mark.parametrize("overrides", [
     {"stages": FLAT}, {"stages": ("torso", "left_arm+right_arm")}, {"stages": ("torso",)}, {"stages": ("right_arm", "torso", "left_arm")},
     {"torso": {"particles": 2}, "arm": {"particles": 3}}, {"torso": {"particles": 31}, "arm": {"particles": 500}}, {"cycles": 7},
-    {"explore": 0}, {"explore": 1}, {"rank_by": "new"}, {"rank_by": "best_new"}, {"torso_arms": "last"}, {"estimate": "mean"}, {"estimate": "best"},
+    {"explore": 0}, {"explore": 1}, {"rank_by": "new"}, {"rank_by": "best_new"}, {"torso_arms": "last"},
+    {"estimate": "mean"}, {"estimate": "best"},
     {"limits": False}, {"ignore_legs": False}, {"arm": {"survival": 0.0}}, {"arm": {"survival": 1.0}}, {"motion_weight": 0.0},
 ])  # fmt: skip
 @pytest.mark.parametrize("preset", ["liu2011", "default"])
