@@ -105,7 +105,7 @@ def films(shared: Path | None = None) -> Iterator[Film]:
     yield Film("real", "balancing", partial(_kept, real / "balancing", ""), {"every": 3})
     yield Film("real", "dancer", partial(_kept, real / "dancer", ""), {"end": "8"})
     yield Film("real", "sitting", partial(_kept, real / "sitting", ""), {"camera": "cam1,cam2,cam4", "end": "2"})
-    yield Film("real", "office", partial(_kept, real / "office", ""), {"every": 2})
+    yield Film("real", "office", partial(_kept, real / "office", ""), {"every": 2, "fov": 43.6})
     yield Film("real", "multiperson", partial(_kept, real / "multiperson", ""), {"end": "1"})
     yield Film("real", "walking", partial(_kept, shared / "recordings" / "walking", ""), {"every": 4, "camera": "cam1,cam3,cam5,cam7"})
     yield Film("real", "reaching", partial(_kept, shared / "recordings" / "reaching", ""))

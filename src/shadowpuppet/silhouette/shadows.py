@@ -1,8 +1,8 @@
 """Distinguishes dark skin or clothes from a shadow on a background of the same hue.
 
-Single pixels are alike: less light, the same colour. Connected parts differ. A limb is broadly connected to the rest of the person, ends
-at an edge as sharp as the film shows edges, and is shaded like a round object or of a slightly different hue. A shadow fades out,
-touches the person at the feet, or darkens its surface evenly.
+Single pixels are alike: less light, the same colour. Connected parts differ. A limb is broadly connected to the rest of the person, or ends
+at a sharp edge, and is shaded like a round object or of a slightly different hue. A shadow fades out, touches the person at the feet, or
+darkens its surface evenly.
 """
 
 from __future__ import annotations
@@ -24,15 +24,12 @@ MAYBE_SHADOW = 3
 """Label of pixels that may be either."""
 MAX_SHADE = 0.92
 """Share of the background's light below which a pixel gets that label: faint borders of shadows have more."""
-MIN_PART_PIXELS = 12
-"""Least size of a limb, pixels; smaller parts are shadow, and closed or filled if they lie inside a person."""
 MAX_LIMB_LIGHT = 0.8
 """Greatest share of the background's light in a limb. Soft shadows in well-lit rooms leave more."""
-NECK_CONTACT, BROAD_CONTACT, ENCLOSED_CONTACT = 0.1, 0.35, 0.7
-"""Share of a part's edge that borders on the rest of the person: least share of a head at the neck, and of most limbs; and the share from
-which on the sharpness of the rest of the edge does not matter."""
-SHARP_EDGE, VERY_SHARP_EDGE = 0.3, 0.5
-"""Share of the lost light regained across a sharp, and a very sharp edge. Soft shadows have 0.1 to 0.35, limbs 0.4 to 0.8."""
+NECK_CONTACT, BROAD_CONTACT = 0.1, 0.35
+"""Least share of a part's edge that borders on the rest of the person: of a head at the neck, and of most limbs."""
+SHARP_EDGE = 0.5
+"""Share of the lost light regained across the edge of a part with little contact. Soft shadows have 0.1 to 0.35, limbs 0.4 to 0.8."""
 MAX_EVEN_SPREAD, MAX_NEUTRAL_HUE, MIN_UNEVEN_SPREAD = 0.6, 0.4, 1.0
 """Standard deviation of brightness and difference of hue, over the assumed standard deviation, below which a part is only darkened
 background; and the deviation of brightness from which on it surely is a limb."""
@@ -83,7 +80,7 @@ def _with_limbs(label: Labels, either: Labels, planes: Image, mean: Floats, inve
 
 def _limbs(sums: np.ndarray, noise: float) -> NDArray[np.bool_]:
     """Whether each part is a limb, of shape (K,); sums: `_part_sums` (K, 12); noise: see `resolve_shadows`."""
-    size, inner, light, square, cr, cb, sigma, edge, along, open_edge, across, _ = sums.T
+    _, inner, light, square, cr, cb, sigma, edge, along, open_edge, across, _ = sums.T
     inner, edge, open_edge = np.maximum(inner, 1), np.maximum(edge, 1), np.maximum(open_edge, 1)
     light, touching = light / inner, along / edge
     spread = np.sqrt(np.maximum(square / inner - light**2, 0)) * sigma / inner
@@ -91,9 +88,8 @@ def _limbs(sums: np.ndarray, noise: float) -> NDArray[np.bool_]:
         spread = np.sqrt(np.maximum(spread**2 - noise**2, 0))
     sharpness = across / open_edge / np.maximum(1 - light, 1e-3)
     shaded = (spread >= MAX_EVEN_SPREAD) | (np.hypot(cr, cb) / inner >= MAX_NEUTRAL_HUE)
-    joined = (touching >= ENCLOSED_CONTACT) | ((touching >= BROAD_CONTACT) & (sharpness >= SHARP_EDGE))
-    alone = (touching >= NECK_CONTACT) & (sharpness >= VERY_SHARP_EDGE) & (spread >= MIN_UNEVEN_SPREAD)
-    return (size >= MIN_PART_PIXELS) & (light <= MAX_LIMB_LIGHT) & ((shaded & joined) | alone)
+    alone = (touching >= NECK_CONTACT) & (sharpness >= SHARP_EDGE) & (spread >= MIN_UNEVEN_SPREAD)
+    return (light <= MAX_LIMB_LIGHT) & ((shaded & (touching >= BROAD_CONTACT)) | alone)
 
 
 def _thin_limbs(sums: np.ndarray) -> NDArray[np.bool_]:
@@ -101,8 +97,8 @@ def _thin_limbs(sums: np.ndarray) -> NDArray[np.bool_]:
     size, inner, *_, edge, along, open_edge, across, light = sums.T
     light, touching = light / np.maximum(size, 1), along / np.maximum(edge, 1)
     sharpness = across / np.maximum(open_edge, 1) / np.maximum(1 - light, 1e-3)
-    joined = (touching >= BROAD_CONTACT) | ((touching >= NECK_CONTACT) & (sharpness >= VERY_SHARP_EDGE))
-    return (size >= MIN_PART_PIXELS) & (inner <= THIN) & (light <= MAX_LIMB_LIGHT) & joined
+    joined = (touching >= BROAD_CONTACT) | ((touching >= NECK_CONTACT) & (sharpness >= SHARP_EDGE))
+    return (inner <= THIN) & (light <= MAX_LIMB_LIGHT) & joined
 
 
 @compiled(nogil=True)
