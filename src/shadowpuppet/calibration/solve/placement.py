@@ -21,10 +21,6 @@ OUTLIER, OUTLIER_PIXELS = 4.0, 1.0
 """Views are left out whose error is over this many times the median of all views and over this many pixels."""
 FLOOR_FROM_BOARD = np.array([[1.0, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]])
 """Board to world for a board that lies on the floor: x as the board's, z up."""
-MIN_UP = 0.5
-"""Least cosine between the floor's normal and the pictures' mean up direction."""
-MIN_LINKED_ANGLE = np.radians(3.0)
-"""Least angle between two cameras' views of a board: with less, their distance is hardly known."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
