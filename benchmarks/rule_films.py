@@ -216,7 +216,7 @@ def _with_lines(film: Film, folder: Path, seed: int, lines: bool) -> dict[str, A
 
 def main() -> None:
     """Parse, track, write."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("shared", type=Path)
