@@ -1,7 +1,8 @@
 """The films on which rules are counted and switched off, and what a run of one is worth: for `rules.py`.
 
 As a program, `rule_films.py FOLDER OUT SHARED SEEDS FILM... [--lines]` tracks films one after another and appends a JSON line to OUT for
-each run that OUT lacks. With `--lines` each line also has the lines of the package that ran, by file.
+each run that OUT lacks. With `--lines` each line also has the lines of the package that ran, by file. With `--silhouettes` nothing is tracked:
+the error is that of the silhouettes of `SHOWN` frames of each camera, thousandths of the area of both.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import argparse
 import json
 import shutil
 import sys
+import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -22,6 +24,8 @@ LOST_MM = 500.0
 """Error of a missing joint, mm."""
 FAR_MM, NEAR_MM = 300.0, 100.0
 """Errors (mm) above which a joint is far off, and below which it is near the truth."""
+SHOWN = 10
+"""Number of frames, spread over the film, whose silhouettes are compared with exact ones."""
 GROUPS = ("ground", "rings", "faults", "postures", "people", "made", "real")
 
 
@@ -159,6 +163,33 @@ def judged(run: Any, folder: Path, recording: Path) -> dict[str, float]:
             "ms": sum(run.metrics.get("ms_per_frame", {}).values())}  # fmt: skip
 
 
+def silhouettes(film: Film, folder: Path) -> dict[str, Any]:
+    """How far a film's silhouettes are from its exact ones, thousandths; and the time a frame (ms). Nothing of a film without exact ones."""
+    import numpy as np
+
+    from shadowpuppet.geometry import evenly_spread
+    from shadowpuppet.motion.metrics import overlap
+    from shadowpuppet.pipeline.footage import take_sample
+    from shadowpuppet.pipeline.options import make_options
+    from shadowpuppet.pipeline.rig import open_rig
+    from shadowpuppet.pipeline.silhouettes import learn_silhouettes
+    from shadowpuppet.silhouette import ready_mask
+
+    options = make_options(dict(film.options))
+    errors, spent, number = list[float](), 0.0, 0
+    for footage in open_rig(film.make(folder / film.label), options).footage:
+        if footage.view.masks is None:
+            continue
+        found, frames = learn_silhouettes(footage, take_sample(footage), options), list(footage.frames(ready=True))
+        for frame in (frames[n] for n in evenly_spread(len(frames), SHOWN)):
+            start = time.process_time()
+            mask = found(frame)
+            spent, number = spent + time.process_time() - start, number + 1
+            if frame.ready is not None and (exact := ready_mask(frame.ready)).any():
+                errors.append(1000 * (1 - overlap(mask, exact)))
+    return {"error": float(np.mean(errors)), "ms": 1000 * spent / number} if errors else {}
+
+
 def run_film(film: Film, folder: Path, seed: int) -> dict[str, Any]:
     """Track a film and judge it."""
     from shadowpuppet.pipeline.options import make_options
@@ -184,7 +215,7 @@ def tracked_films(arguments: argparse.Namespace) -> Iterator[dict[str, Any]]:
     for label in arguments.films:
         for seed in range(arguments.seeds):
             if (label, seed) not in done:
-                yield {"film": label, "seed": seed} | _with_lines(chosen[label], arguments.folder, seed, arguments.lines)
+                yield {"film": label, "seed": seed} | _measured(chosen[label], seed, arguments)
 
 
 def _tiny() -> Film:
@@ -193,9 +224,12 @@ def _tiny() -> Film:
     return Film("tiny", "", partial(_made, ONE, True), {"masks": True})
 
 
-def _with_lines(film: Film, folder: Path, seed: int, lines: bool) -> dict[str, Any]:
+def _measured(film: Film, seed: int, arguments: argparse.Namespace) -> dict[str, Any]:
     """A run, and with `lines` which lines of the package ran, by file."""
-    if not lines:
+    folder: Path = arguments.folder
+    if arguments.silhouettes:
+        return silhouettes(film, folder)
+    if not arguments.lines:
         return run_film(film, folder, seed)
     import coverage
 
@@ -223,6 +257,7 @@ def main() -> None:
     parser.add_argument("seeds", type=int)
     parser.add_argument("films", nargs="+")
     parser.add_argument("--lines", action="store_true")
+    parser.add_argument("--silhouettes", action="store_true")
     arguments = parser.parse_args()
     if arguments.lines:  # the lines of another process would not be counted
         import shadowpuppet.pipeline.frame_process as frame_process
@@ -231,7 +266,7 @@ def main() -> None:
     for found in tracked_films(arguments):
         with arguments.out.open("a", encoding="utf-8") as file:
             file.write(json.dumps(found) + "\n")
-        print(found["film"], found["seed"], found.get("refused") or f"{found['error']:.1f} mm, {found['ms']:.0f} ms", flush=True)
+        print(found["film"], found["seed"], found.get("refused") or f"{found.get('error', float('nan')):.1f}, {found.get('ms', 0):.0f} ms", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """What rules are worth: how often the code behind thresholds runs on a set of films, and what films lose when a rule is switched off.
 
-    python benchmarks/rules.py [--count] [--switch SWITCH]... [--films "ground;rings/rings_jog"] [--seeds 5] [--shared ../shared]
-        [--out build/rules]
+    python benchmarks/rules.py [--count] [--switch SWITCH]... [--films "ground;rings/rings_jog"] [--seeds 5] [--silhouettes]
+        [--shared ../shared] [--out build/rules]
 
 `rule_films.py` has the films: the proving grounds, faults, postures, people, five made people, and real films where they are.
 
@@ -13,6 +13,8 @@ values that arrays select.
 between them. Each switch has a process and, where the rule is in compiled code, kernels of its own. A film refused counts as lost. `se` is
 the standard error of the difference in pairs of film and seed: differences within two of them are not significant; `noise` is the standard
 error of the mean that seeds alone make.
+
+`--silhouettes` tracks nothing and needs no seeds: the error is that of the silhouettes against exact ones, thousandths of their area.
 
 Every finished run is a JSON line in `--out`; another start does the missing ones.
 """
@@ -73,10 +75,11 @@ def runs(switch: str, labels: Sequence[str], args: argparse.Namespace, lines: bo
     args.out.mkdir(parents=True, exist_ok=True)
     environment = copied(edits, args.out / "packages") | ONE_THREAD_EACH
     state = fingerprint({path.relative_to(PACKAGE): path.read_text("utf-8") for path in sorted(PACKAGE.rglob("*.py"))})
-    name = hashlib.sha256(f"{state} {switch}".encode()).hexdigest()[:12]
-    out, seeds = args.out / f"{name}{'_lines' * lines}.jsonl", 1 if lines else args.seeds
+    name, flags = hashlib.sha256(f"{state} {switch}".encode()).hexdigest()[:12], ["--lines"] * lines
+    flags += ["--silhouettes"] * (args.silhouettes and not lines)
+    out, seeds = args.out / f"{name}{''.join(flags)}.jsonl", 1 if flags else args.seeds
     command = [sys.executable, rule_films.__file__, args.out / "films", out, args.shared, str(seeds), *labels]
-    subprocess.run([*map(str, command), *["--lines"] * lines], env=environment, check=True)
+    subprocess.run([*map(str, command), *flags], env=environment, check=True)
     found = [json.loads(line) for line in out.read_text("utf-8").splitlines()]
     return [each for each in found if each["film"] in labels and each["seed"] < seeds]
 
@@ -182,8 +185,8 @@ def _value(found: Mapping[str, Any], name: str) -> float:
 
 
 def switch_table(rows: Mapping[str, list[str]]) -> str:
-    """A line a switch, as Markdown."""
-    heads = ["error, mm", "se", "noise", "silent, %", "false alarms, %", "tracked, %", "overlap", "ms"]
+    """A line a switch, as Markdown; errors are millimetres, or thousandths with `--silhouettes`."""
+    heads = ["error", "se", "noise", "silent, %", "false alarms, %", "tracked, %", "overlap", "ms"]
     lines = ["| switched off | " + " | ".join(heads) + " |", "|---" * (len(heads) + 1) + "|"]
     return "\n".join([*lines, *(f"| {name} | " + " | ".join(cells) + " |" for name, cells in rows.items())])
 
@@ -212,6 +215,7 @@ def main() -> None:
     parser.add_argument("--switch", action="append", default=[], help="a rule to switch off; again for more")
     parser.add_argument("--films", default="", help="groups or films, with ; between them; all without")
     parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--silhouettes", action="store_true", help="compare silhouettes alone")
     parser.add_argument("--shared", type=Path, default=ROOT.parent / "shared", help="folder with real/ and recordings/")
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "rules", help="where films and runs are, or are made")
     args = smallest.parse(parser, _smallest)
