@@ -1,8 +1,8 @@
 """The films on which rules are counted and switched off, and what a run of one is worth: for `rules.py`.
 
-As a program, `rule_films.py FOLDER OUT SHARED SEEDS FILM... [--lines]` tracks films one after another and appends a JSON line to OUT for
-each run that OUT lacks. With `--lines` each line also has the lines of the package that ran, by file. With `--silhouettes` nothing is tracked:
-the error is that of the silhouettes of `SHOWN` frames of each camera, thousandths of the area of both.
+As a program, `rule_films.py FOLDER OUT SHARED SEEDS FILM... [--lines] [--silhouettes]` tracks films one after another and appends a JSON
+line to OUT for each run that OUT lacks. With `--lines` each line also has the lines of the package that ran, by file. With `--silhouettes`
+nothing is tracked: the error is that of the silhouettes of `SHOWN` frames of each camera, thousandths of the area of both.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ def judged(run: Any, folder: Path, recording: Path) -> dict[str, float]:
 
 
 def silhouettes(film: Film, folder: Path) -> dict[str, Any]:
-    """How far a film's silhouettes are from its exact ones, thousandths; and the time a frame (ms). Nothing of a film without exact ones."""
+    """How far a film's silhouettes are from its exact ones, thousandths, and the time a frame (ms); empty without exact ones."""
     import numpy as np
 
     from shadowpuppet.geometry import evenly_spread
@@ -175,7 +175,7 @@ def silhouettes(film: Film, folder: Path) -> dict[str, Any]:
     from shadowpuppet.pipeline.silhouettes import learn_silhouettes
     from shadowpuppet.silhouette import ready_mask
 
-    options = make_options(dict(film.options))
+    options = make_options({**film.options, "masks": False})
     errors, spent, number = list[float](), 0.0, 0
     for footage in open_rig(film.make(folder / film.label), options).footage:
         if footage.view.masks is None:
@@ -266,7 +266,8 @@ def main() -> None:
     for found in tracked_films(arguments):
         with arguments.out.open("a", encoding="utf-8") as file:
             file.write(json.dumps(found) + "\n")
-        print(found["film"], found["seed"], found.get("refused") or f"{found.get('error', float('nan')):.1f}, {found.get('ms', 0):.0f} ms", flush=True)
+        told = found.get("refused") or f"error {found.get('error', float('nan')):.1f}, {found.get('ms', 0):.0f} ms"
+        print(found["film"], found["seed"], told, flush=True)
 
 
 if __name__ == "__main__":

@@ -181,7 +181,8 @@ def noise(values: Mapping[tuple[str, int], float]) -> float:
 
 def _value(found: Mapping[str, Any], name: str) -> float:
     """A measure of a run; of a film that was refused its error is that of a lost one."""
-    return float(found.get(name, {"error": LOST_MM, "tracked": 0.0, "overlap": 0.0}.get(name, np.nan)))
+    lost = {"error": LOST_MM, "tracked": 0.0, "overlap": 0.0} if "refused" in found else {}
+    return float(found.get(name, lost.get(name, np.nan)))
 
 
 def switch_table(rows: Mapping[str, list[str]]) -> str:
