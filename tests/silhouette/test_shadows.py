@@ -11,7 +11,7 @@ from silhouette_scenes import SIZE, empty_shots, overlap, scene, shot
 
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.silhouette.classifiers import ChannelClassifier
-from shadowpuppet.silhouette.shadows import INWARD_STEP, MAX_SHADE, MAYBE_SHADOW, OUTWARD_STEP, _part_sums, _thin_limbs, resolve_shadows
+from shadowpuppet.silhouette.shadows import INWARD_STEP, MAX_SHADE, MAYBE_SHADOW, OUTWARD_STEP, _part_sums, resolve_shadows
 
 SKIN_WALL = (90, 110, 150)
 """A wall of the hue of skin; blue green red."""
@@ -138,14 +138,14 @@ def test_what_is_reported_at_once_is_what_every_pixel_tells(seed, key, darkest):
 
 
 def naive_sums(parts, number, label, top, left, planes, mean, inverse_sigma):
-    out = np.zeros((number, 12))
+    out = np.zeros((number, 11))
     light = planes[..., 0] / np.maximum(mean[..., 0], 1)
     hue = ((planes[..., 1:] - 128.0) - light[..., None] * (mean[..., 1:] - 128.0)) * inverse_sigma[..., 1:]
     whole = np.zeros(label.shape, int)
     whole[top : top + parts.shape[0], left : left + parts.shape[1]] = parts
     for y, x in np.argwhere(whole):
         part, same, k = whole[y, x], 0, whole[y, x]
-        out[k, [0, 11]] += [1, light[y, x]]
+        out[k, 0] += 1
         for d in np.array([(-1, 0), (1, 0), (0, -1), (0, 1)]):
             at = np.array([y, x]) + d
             if (at < 0).any() or (at >= label.shape).any():
@@ -183,60 +183,3 @@ def test_sums_over_parts_are_those_of_the_naive_twin(seed):
     label[label == MAYBE_SHADOW] = 0
     found = _part_sums(parts, number, label, top, left, planes, mean, inverse_sigma)
     np.testing.assert_allclose(found, naive_sums(parts, number, label, top, left, planes, mean, inverse_sigma), rtol=1e-4, atol=1e-4)
-
-
-def smeared_hand() -> tuple[np.ndarray, ...]:
-    """A bright wall's planes, those of a frame with a trunk and a thin dark arm of the wall's hue, and the masks (H, W) of both."""
-    mean = np.full((*SIZE, 3), (150, 128, 128), np.float32)
-    planes = mean.astype(np.uint8)
-    trunk, arm = np.zeros(SIZE, bool), np.zeros(SIZE, bool)
-    trunk[40:, 60:100], arm[60:63, 100:109] = True, True
-    planes[trunk] = (60, 160, 100)
-    planes[arm] = (80, 128, 128)
-    return mean, planes, trunk, arm
-
-
-def test_a_thin_dark_arm_of_the_walls_hue_is_the_persons_in_a_smeared_film():
-    mean, planes, trunk, arm = smeared_hand()
-    label = np.where(trunk, 2, np.where(arm, MAYBE_SHADOW, 0)).astype(np.uint8)
-    inverse = np.full_like(mean, 0.4)
-    plain, smeared = (resolve_shadows(label, planes, mean, inverse, smeared=each) for each in (False, True))
-    assert not plain[arm].any()
-    assert smeared[arm].all()
-    assert not smeared[~arm & ~trunk].any()
-
-
-def test_a_dark_limb_is_not_lost_in_its_own_shadow_in_a_smeared_film():
-    """One part of the same hue; the shadow is lighter."""
-    mean, planes, trunk, _ = smeared_hand()
-    limb, shadow = np.zeros(SIZE, bool), np.zeros(SIZE, bool)
-    limb[90:, 102:112], shadow[85:, 112:158] = True, True
-    limb[90:, 100:102] = True
-    planes[limb] = (75, 130, 126)
-    planes[100:, 100:106] = (90, 130, 126)
-    planes[shadow] = (133, 128, 128)
-    label = np.where(trunk, 2, np.where(limb | shadow, MAYBE_SHADOW, 0)).astype(np.uint8)
-    inverse = np.full_like(mean, 0.4)
-    plain, smeared = (resolve_shadows(label, planes, mean, inverse, smeared=each) for each in (False, True))
-    assert not plain[limb].any()
-    assert smeared[limb].mean() > 0.9
-    assert not smeared[shadow].any()
-
-
-@pytest.mark.parametrize("light", [0.55, 0.7])
-def test_a_broad_shadow_beside_the_person_is_no_limb_in_a_smeared_film_either(light):
-    mean, planes, trunk, _ = smeared_hand()
-    shadow = np.zeros(SIZE, bool)
-    shadow[60:110, 104:150] = True
-    planes[shadow] = (round(150 * light), 128, 128)
-    label = np.where(trunk, 2, np.where(shadow, MAYBE_SHADOW, 0)).astype(np.uint8)
-    assert not resolve_shadows(label, planes, mean, np.full_like(mean, 0.4), smeared=True)[shadow].any()
-
-
-def test_the_outline_of_a_thin_limb_is_as_sharp_as_its_own_darkness_allows():
-    """Sums of a part of 40 pixels that is 0.4 as bright as the scene and touches others with a fifth of its edge; one pixel of it is open,
-    where brightness falls by `across`: sharp is half of the 0.6 that it is darker."""
-    for across, limb in ((0.33, 1), (0.27, 0)):
-        sums = np.zeros((1, 12))
-        sums[0, :2], sums[0, -5:] = (40, 2), (10, 2, 1, across, 16)
-        assert _thin_limbs(sums) == [limb]

@@ -73,11 +73,6 @@ class ChannelClassifier:
     """Least share of its brightness that the background keeps in shadow; 1: no pixel counts as shadow."""
     smoothing: float = SMOOTHING
     """Standard deviation of the smoothing of frames, pixels."""
-    noise: float = 0.0
-    """Standard deviation of noise in smoothed frames beyond that of a clean film, in assumed standard deviations."""
-
-    smeared: bool = False
-    """Whether the film has lost detail to compression or focus."""
     areas: AreaColours | None = None
     """Colours averaged over areas, which are compared too; None unless the film is noisy."""
 
@@ -100,7 +95,7 @@ class ChannelClassifier:
         if not resolved:
             return label, None
         either = label == MAYBE_SHADOW
-        label = resolve_shadows(label, smooth, self.mean, self.inverse_sigma, self.noise, self.smeared)
+        label = resolve_shadows(label, smooth, self.mean, self.inverse_sigma)
         return label, either & (label == 0)
 
     @cached_property

@@ -29,8 +29,6 @@ COLOUR_FLOOR = 0.75
 """Noise floor of colours over that of brightness: codecs average colours over four pixels."""
 NOISE_TAIL_FACTOR = 1.8
 """Factor on the film's measured noise: compression errors have longer tails than a normal distribution."""
-EXCESS_NOISE = 0.4
-"""Standard deviation of a noisy film's noise beyond a clean film's, over the assumed one."""
 FILM_SAMPLE = 12
 """Number of frames in which the film's noise and the blur of its outlines are measured; at most twice as many are used."""
 MIN_EDGE_CONTRAST = 1.5
@@ -80,14 +78,13 @@ def _channel_classifier(background: Background, frames: list[Image], settings: S
     """The classifier of all channels; `plain`: the `frames` before lost detail was restored, or they themselves; `noise`: theirs."""
     # Without colour, dark grey clothes and a shadow are the same.
     darkest = DARKEST_SHADOW if settings.shadow and _coloured(background, frames) else 1.0
-    smeared = plain is not frames
-    if smeared:  # what restoring leaves has long tails: blocks of wrong colours
+    if plain is not frames:  # what restoring leaves has long tails: blocks of wrong colours
         noise = noise._replace(sigma=_noise_of(plain, background, noise.smoothing))
     mean = scene.smoothed(background.mean, noise.smoothing)
     sigma = assumed_sigma(background, noise, settings.noise_floor, mean)
     areas = _area_colours(background, frames, noise, settings) if noise.grainy and background.colour else None
     return ChannelClassifier("both", mean, (1 / sigma).astype(np.float32), settings.factor, darkest, noise.smoothing,
-                             EXCESS_NOISE if noise.noisy else 0.0, smeared, areas)
+                             areas)
 
 
 def _noise_of(frames: list[Image], background: Background, smoothing: float) -> NDArray[np.float64]:

@@ -1,8 +1,8 @@
 """Distinguishes dark skin or clothes from a shadow on a background of the same hue.
 
-Single pixels are alike: less light, the same colour. Connected parts differ. A limb is broadly connected to the rest of the person, ends
-at an edge as sharp as the film shows edges, and is shaded like a round object or of a slightly different hue. A shadow fades out,
-touches the person at the feet, or darkens its surface evenly.
+Single pixels are alike: less light, the same colour. Connected parts differ. A limb is broadly connected to the rest of the person, or ends
+at a sharp edge, and is shaded like a round object or of a slightly different hue. A shadow fades out, touches the person at the feet, or
+darkens its surface evenly.
 """
 
 from __future__ import annotations
@@ -24,96 +24,61 @@ MAYBE_SHADOW = 3
 """Label of pixels that may be either."""
 MAX_SHADE = 0.92
 """Share of the background's light below which a pixel gets that label: faint borders of shadows have more."""
-MIN_PART_PIXELS = 12
-"""Least size of a limb, pixels; smaller parts are shadow, and closed or filled if they lie inside a person."""
 MAX_LIMB_LIGHT = 0.8
 """Greatest share of the background's light in a limb. Soft shadows in well-lit rooms leave more."""
-NECK_CONTACT, BROAD_CONTACT, ENCLOSED_CONTACT = 0.1, 0.35, 0.7
-"""Share of a part's edge that borders on the rest of the person: least share of a head at the neck, and of most limbs; and the share from
-which on the sharpness of the rest of the edge does not matter."""
-SHARP_EDGE, VERY_SHARP_EDGE = 0.3, 0.5
-"""Share of the lost light regained across a sharp, and a very sharp edge. Soft shadows have 0.1 to 0.35, limbs 0.4 to 0.8."""
+NECK_CONTACT, BROAD_CONTACT = 0.1, 0.35
+"""Least share of a part's edge that borders on the rest of the person: of a head at the neck, and of most limbs."""
+SHARP_EDGE = 0.5
+"""Share of the lost light regained across the edge of a part with little contact. Soft shadows have 0.1 to 0.35, limbs 0.4 to 0.8."""
 MAX_EVEN_SPREAD, MAX_NEUTRAL_HUE, MIN_UNEVEN_SPREAD = 0.6, 0.4, 1.0
 """Standard deviation of brightness and difference of hue, over the assumed standard deviation, below which a part is only darkened
 background; and the deviation of brightness from which on it surely is a limb."""
-THIN = 3
-"""Number of pixels well inside a part up to which it is too thin to have a colour of its own in a film that has lost detail: codecs
-average colours over more than a hand's width."""
 OUTWARD_STEP, INWARD_STEP = 2, 1
 """Distances from an edge, pixels, between which light is compared."""
 
 
-def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: Floats, noise: float = 0.0,
-                    smeared: bool = False) -> Labels:
+def resolve_shadows(label: Labels, planes: Image, mean: Floats, inverse_sigma: Floats) -> Labels:
     """Labels (H, W) in which `MAYBE_SHADOW` is replaced by 1, perhaps a person, or 0, background.
 
     planes, mean, inverse_sigma: smoothed Y, Cr, Cb of frame and background and the inverse standard deviation, of shape (H, W, 3).
-    noise: standard deviation of the film's noise beyond that of a clean film, in those standard deviations.
-    smeared: whether the film has lost detail, so that thin parts are judged by edges and contact alone.
     """
     import cv2
 
     either = np.asarray(cv2.inRange(label, MAYBE_SHADOW, MAYBE_SHADOW), np.uint8)
-    label = _with_limbs(label & ~either, either, planes, mean, inverse_sigma, noise, smeared)
-    if smeared:  # trousers that have lost their hue are one part with their shadow on the floor, unless by their light
-        dark = np.asarray(planes[..., 0] <= MAX_LIMB_LIGHT * mean[..., 0])
-        label = _with_limbs(label, np.where(dark & (label == 0), either, 0).astype(np.uint8), planes, mean, inverse_sigma, noise, smeared)
-    return label
-
-
-def _with_limbs(label: Labels, either: Labels, planes: Image, mean: Floats, inverse_sigma: Floats, noise: float,
-                smeared: bool) -> Labels:
-    """Labels (H, W) with 1, perhaps a person, where the pixels (H, W) that may be either, 255, are a limb's; the rest as in
-    `resolve_shadows`."""
-    import cv2
-
+    label = label & ~either
     firm = np.asarray(cv2.morphologyEx(either, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), np.uint8)
     window = bounding_window(firm, 1)
     if not firm[window].any():
         return label
     number, parts = connected(np.ascontiguousarray(firm[window]), 4)
-    sums = _part_sums(parts, number, label, window[0].start, window[1].start, planes, mean, inverse_sigma)
-    limbs = _limbs(sums, noise) | _thin_limbs(sums) if smeared else _limbs(sums, noise)
-    if not limbs.any():
-        return label
-    found, out = chosen_parts(parts, limbs), label.copy()
-    out[window] |= np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either[window] >> 7)
-    return out
+    limbs = _limbs(_part_sums(parts, number, label, window[0].start, window[1].start, planes, mean, inverse_sigma))
+    if limbs.any():
+        found = chosen_parts(parts, limbs)
+        label[window] |= np.asarray(cv2.dilate(found, np.ones((3, 3), np.uint8)), np.uint8) & (either[window] >> 7)
+    return label
 
 
-def _limbs(sums: np.ndarray, noise: float) -> NDArray[np.bool_]:
-    """Whether each part is a limb, of shape (K,); sums: `_part_sums` (K, 12); noise: see `resolve_shadows`."""
-    size, inner, light, square, cr, cb, sigma, edge, along, open_edge, across, _ = sums.T
+def _limbs(sums: np.ndarray) -> NDArray[np.bool_]:
+    """Whether each part is a limb, of shape (K,); sums: `_part_sums` (K, 11)."""
+    _, inner, light, square, cr, cb, sigma, edge, along, open_edge, across = sums.T
     inner, edge, open_edge = np.maximum(inner, 1), np.maximum(edge, 1), np.maximum(open_edge, 1)
     light, touching = light / inner, along / edge
     spread = np.sqrt(np.maximum(square / inner - light**2, 0)) * sigma / inner
-    if noise:
-        spread = np.sqrt(np.maximum(spread**2 - noise**2, 0))
     sharpness = across / open_edge / np.maximum(1 - light, 1e-3)
     shaded = (spread >= MAX_EVEN_SPREAD) | (np.hypot(cr, cb) / inner >= MAX_NEUTRAL_HUE)
-    joined = (touching >= ENCLOSED_CONTACT) | ((touching >= BROAD_CONTACT) & (sharpness >= SHARP_EDGE))
-    alone = (touching >= NECK_CONTACT) & (sharpness >= VERY_SHARP_EDGE) & (spread >= MIN_UNEVEN_SPREAD)
-    return (size >= MIN_PART_PIXELS) & (light <= MAX_LIMB_LIGHT) & ((shaded & joined) | alone)
-
-
-def _thin_limbs(sums: np.ndarray) -> NDArray[np.bool_]:
-    """Whether each part is thin, with the edges or the contact of a limb, of shape (K,); sums: `_part_sums` (K, 12)."""
-    size, inner, *_, edge, along, open_edge, across, light = sums.T
-    light, touching = light / np.maximum(size, 1), along / np.maximum(edge, 1)
-    sharpness = across / np.maximum(open_edge, 1) / np.maximum(1 - light, 1e-3)
-    joined = (touching >= BROAD_CONTACT) | ((touching >= NECK_CONTACT) & (sharpness >= VERY_SHARP_EDGE))
-    return (size >= MIN_PART_PIXELS) & (inner <= THIN) & (light <= MAX_LIMB_LIGHT) & joined
+    alone = (touching >= NECK_CONTACT) & (sharpness >= SHARP_EDGE) & (spread >= MIN_UNEVEN_SPREAD)
+    return (light <= MAX_LIMB_LIGHT) & ((shaded & (touching >= BROAD_CONTACT)) | alone)
 
 
 @compiled(nogil=True)
 def _part_sums(parts, number, label, top, left, planes, mean, inverse_sigma):
-    """Sums over each of `number` parts (int32, (h, w), at row `top` and column `left` of the picture), of shape (number, 12).
+    """Sums over each of `number` parts (int32, (h, w), at row `top` and column `left` of the picture), of shape (number, 11).
 
     Columns: 0 pixels. Over pixels well inside: 1 their number, 2 light (share of the background's brightness), 3 its square, 4 and 5
     difference of Cr and Cb from the darkened background, 6 the background's brightness, 4 to 6 in standard deviations. Sides of pixels
-    on the edge: 7 their number, 8 those along the person, 9 others, 10 gain of light across those others. 11 light of all pixels.
+    on the edge: 7 their number, 8 those along the person, 9 others, 10 gain of light across those others.
     """
-    out = np.zeros((number, 12))
+    out = np.zeros((number, 11))
     height, width = label.shape
     for row in range(parts.shape[0]):
         for column in range(parts.shape[1]):
@@ -123,7 +88,6 @@ def _part_sums(parts, number, label, top, left, planes, mean, inverse_sigma):
             y, x, inside = row + top, column + left, 0
             light = planes[y, x, 0] / max(mean[y, x, 0], np.float32(1))
             out[part, 0] += 1
-            out[part, 11] += light
             for dy, dx in ((-1, 0), (1, 0), (0, -1), (0, 1)):
                 v, u = row + dy, column + dx
                 if 0 <= v < parts.shape[0] and 0 <= u < parts.shape[1] and parts[v, u] == part:
