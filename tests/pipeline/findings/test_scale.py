@@ -24,7 +24,8 @@ HEIGHT = 1.75
 
 
 def error(cameras, masks, factor, height=None):
-    return scale_error([made_rig.scaled(camera, factor) for camera in cameras], masks, MultiviewSettings(), height)
+    scaled = [made_rig.scaled(camera, factor) for camera in cameras]
+    return scale_error(scaled, scale.moments_of(scaled, masks, MultiviewSettings()), MultiviewSettings(), height)
 
 
 @pytest.mark.parametrize(("heights", "height", "named"), [

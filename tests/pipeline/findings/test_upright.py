@@ -10,6 +10,7 @@ import pytest
 import rendered
 
 from shadowpuppet.geometry import rigid, rotation_from_vector
+from shadowpuppet.pipeline.findings.scale import moments_of
 from shadowpuppet.pipeline.findings.upright import up_caution
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.prepare import look_at
@@ -20,7 +21,8 @@ WALK = (1.7, "standing", "walk", 4)
 
 def said(turn, person=WALK):
     cameras, masks = rendered.person(*person)
-    return up_caution(turned(cameras, turn), masks, MultiviewSettings())
+    world = turned(cameras, turn)
+    return up_caution(world, moments_of(world, masks, MultiviewSettings()), MultiviewSettings())
 
 
 def turned(cameras, vector):

@@ -23,7 +23,7 @@ from shadowpuppet.pipeline.findings.delays import delay_cautions
 from shadowpuppet.pipeline.findings.film import of_several, survey_films
 from shadowpuppet.pipeline.findings.look import CameraLook, FilmSurvey, FirstSeconds, RigLook, Survey
 from shadowpuppet.pipeline.findings.opening import OPENING, first_seconds, opening_of
-from shadowpuppet.pipeline.findings.scale import error_in
+from shadowpuppet.pipeline.findings.scale import error_in, moments_of
 from shadowpuppet.pipeline.findings.upright import up_caution
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.options import Options
@@ -82,8 +82,9 @@ def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, fil
     if not (refusal or several or agree.doubts()):
         doubts += delay_cautions(rig, silhouettes, options.masks)
     if not (refusal or several):
-        scale = error_in(rig, first.masks, options)
-        found = (None if scale is None else scale.caution(), up_caution(rig.cameras, first.masks, options.multiview))
+        moments = moments_of(rig.cameras, first.masks, options.multiview)
+        scale = error_in(rig, moments, options)
+        found = (None if scale is None else scale.caution(), up_caution(rig.cameras, moments, options.multiview))
         doubts = [each for each in found if each is not None] + doubts
     if several and options.people != 1:
         doubts.insert(0, Finding.of("{people} people are in the recording: each is tracked, into person-1, person-2, ... of the run",

@@ -70,27 +70,26 @@ class Moment(NamedTuple):
     """Of the hull, (3,), metres, the longest first."""
 
 
-def error_in(rig: Rig, views: Sequence[Sequence[Mask | None]], options: Options) -> ScaleError | None:
+def error_in(rig: Rig, moments: Sequence[Moment], options: Options) -> ScaleError | None:
     """`scale_error` of a rig, of a person whose height the options or the recording may give."""
-    return scale_error(rig.cameras, views, options.multiview, options.height or rig.recording.subject.height)
+    return scale_error(rig.cameras, moments, options.multiview, options.height or rig.recording.subject.height)
 
 
 @one_blas_thread()
-def scale_error(cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]], settings: MultiviewSettings,
+def scale_error(cameras: Sequence[Camera], moments: Sequence[Moment], settings: MultiviewSettings,
                 height: float | None = None) -> ScaleError | None:
-    """The scale's error by `views`, masks (H, W) by time and camera, of a person of a known `height`, metres, or any; None if the scale may
-    be right, or nobody is seen well enough.
+    """The scale's error by moments of a person of a known `height`, metres, or any; None if the scale may be right, or too few moments show
+    the person.
 
     Hulls of a person who stands tell at once that a scale is right. A body is fitted where they do not: of people who sit, or reach aside.
     """
-    moments = moments_of(cameras, views, settings)
     if stands([moment.extents for moment in moments], height):
         return None
     return judged(fitted_heights(cameras, moments, settings), height)
 
 
 def moments_of(cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]], settings: MultiviewSettings) -> list[Moment]:
-    """`FRAMES` moments at most, spread over `views`, in which at least two cameras see a whole person."""
+    """`FRAMES` moments at most, spread over `views`, masks (H, W) by time and camera, in which at least two cameras see a whole person."""
     whole = [moment for n in evenly_spread(len(views), SETS_COMPARED) if views for moment in _moment(cameras, views[n], settings)]
     return [whole[n] for n in evenly_spread(len(whole), FRAMES) if whole]
 
@@ -109,7 +108,7 @@ def is_slender(extents: Array) -> bool:
 
 
 def fitted_heights(cameras: Sequence[Camera], moments: Sequence[Moment], settings: MultiviewSettings) -> Array:
-    """The heights (F,), metres, that bodies have which are fitted to the moments; of moments that a body fits."""
+    """The heights (F,), metres, of bodies fitted to the moments that a body fits."""
     fitted = (seen_stature(np.random.default_rng(0), cameras, moment.masks, settings) for moment in moments)
     return np.array([each.height for each in fitted if each is not None])
 

@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import RUINOUS, Finding
 from shadowpuppet.geometry import Array
-from shadowpuppet.pipeline.findings.scale import Moment, is_slender, moments_of
+from shadowpuppet.pipeline.findings.scale import Moment, is_slender
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.seen_stature import person_points, seen_stature
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
@@ -25,13 +24,11 @@ UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 @one_blas_thread()
-def up_caution(cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]], settings: MultiviewSettings) -> Finding | None:
-    """A word on a world whose Z is not up, by `views`, masks (H, W) by time and camera, of a person who walks; None if it may be up.
+def up_caution(cameras: Sequence[Camera], moments: Sequence[Moment], settings: MultiviewSettings) -> Finding | None:
+    """A word on a world whose Z is not up, by moments of a person who walks; None if it may be up.
 
-    Feet are spread and a head is not; where the upper end is the wider one, a body
-    is fitted both ways, too.
+    Feet are spread and a head is not; where the upper end is the wider one, a body is fitted both ways, too.
     """
-    moments = moments_of(cameras, views, settings)
     points = [person_points(cameras, moment.masks, settings.hull).points for moment in moments]
     if len(moments) < 2 or not all(is_slender(moment.extents) and len(each) for moment, each in zip(moments, points)):
         return None

@@ -10,7 +10,7 @@ import numpy as np
 from shadowpuppet.calibration.clock_offset import ClockOffsets
 from shadowpuppet.calibration.time_offset import MIN_OFFSET, SPREAD_FACTOR, TimeOffsets
 from shadowpuppet.errors import RecordingError
-from shadowpuppet.pipeline.findings.scale import error_in
+from shadowpuppet.pipeline.findings.scale import error_in, moments_of
 from shadowpuppet.pipeline.findings.upright import up_caution
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
@@ -53,7 +53,8 @@ def check_films(rig: Rig, options: Options, listener: Listener | None = None) ->
     if checked.check.agreement.hopeless:
         return checked
     masks = [[None if each is None else each.mask for each in row] for row in checked.sets.rows]
-    scale, not_up = error_in(rig, masks, options), up_caution(rig.cameras, masks, options.multiview)
+    moments = moments_of(rig.cameras, masks, options.multiview)
+    scale, not_up = error_in(rig, moments, options), up_caution(rig.cameras, moments, options.multiview)
     said = [str(each) for each in (None if scale is None else scale.caution(), not_up) if each is not None]
     return checked._replace(check=replace(checked.check, scale=scale, doubts=(*said, *checked.check.doubts)))
 
