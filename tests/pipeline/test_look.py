@@ -242,7 +242,7 @@ def test_a_scene_taken_from_the_film_is_said(recording, tmp_path):
 def look_at_masks(recording):
     """The look without the search for the person."""
     footage = open_footage(recording, Options())
-    return _look(footage, survey_film(footage, Options()), whole=False)
+    return _look(footage, survey_film(footage, Options()), Options())
 
 
 def test_uneven_times_are_said(recording, tmp_path):
