@@ -22,7 +22,7 @@ from shadowpuppet.pipeline.findings.scale import fitted_heights, judged, moments
 from shadowpuppet.synthetic import Mannequin, Ring, Scene, Spec
 from shadowpuppet.synthetic.movement.resting import PostureName
 from shadowpuppet.synthetic.person.clothes import Clothes
-from shadowpuppet.synthetic.person.mannequin import Kind
+from shadowpuppet.synthetic.person.mannequin import PersonKind
 from shadowpuppet.synthetic.person_renderer import PersonRenderer
 from shadowpuppet.synthetic.recording import perform
 from shadowpuppet.synthetic.scene_renderer import dressed
@@ -31,7 +31,7 @@ from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
 FACTORS = (0.7, 0.87, 1.0, 1.15, 1.4, 2.0)
-PEOPLE: tuple[tuple[Kind, float | None], ...] = (
+PEOPLE: tuple[tuple[PersonKind, float | None], ...] = (
     ("child", 1.2), ("man", 2.05), ("woman", None), ("man", None), ("child", None))  # fmt: skip
 """Kind and stature, metres; None: drawn."""
 MOTIONS: tuple[tuple[str, PostureName], ...] = (

@@ -32,7 +32,7 @@ class Request:
     flags: tuple[str, ...] = ()
     """Those that differ from their defaults, as on the command line."""
     fingerprint: Mapping[str, list[float]] = field(default_factory=dict)
-    """What the results depend on (`papers.common.fingerprint`); empty for a short version."""
+    """What the results depend on (`papers.common.fingerprint`); empty for a short version, and for recordings that are given."""
 
     @property
     def seeds(self) -> range:

@@ -21,7 +21,8 @@ def main(paper: str, about: str, experiments: Sequence[Experiment], argv: Sequen
          fingerprint: Callable[[Request], Fingerprint] | None = None) -> int:
     """Run the named experiments, or list them all; the exit code, 2 for input that cannot be used.
 
-    `add` adds the paper's own options to the parser; their values are in `Request.more`. `fingerprint`: of what the results depend on.
+    `add` adds the paper's own options to the parser; their values are in `Request.more`. `fingerprint`: of what results on made recordings
+    depend on.
     """
     parser = _parser(paper, about, experiments)
     own = set(vars(parser.parse_args([])))
@@ -39,7 +40,8 @@ def main(paper: str, about: str, experiments: Sequence[Experiment], argv: Sequen
     request = Request(args.output, tuple(args.recording), 1, args.seed, args.short, args.workers, _tell, more, flags)
     try:
         _make_folder(request.output)
-        request = request if fingerprint is None or args.short else replace(request, fingerprint=fingerprint(request))
+        if fingerprint is not None and not (args.short or request.recordings):  # the page is of made recordings
+            request = replace(request, fingerprint=fingerprint(request))
         for name in dict.fromkeys(known if "all" in args.names else args.names):
             run(paper, known[name], replace(request, runs=args.runs or _runs(known[name], args.short)), list(known).index(name))
     except ShadowPuppetError as error:

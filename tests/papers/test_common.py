@@ -306,7 +306,7 @@ def test_results_of_different_films_are_no_page(tmp_path, docs, capsys):
 
 
 def test_a_full_run_takes_the_fingerprint_and_a_short_one_does_not(tmp_path):
-    for flags, wanted in (([], {"film": [1.0]}), (["--short"], {})):
+    for flags, wanted in (([], {"film": [1.0]}), (["--short"], {}), (["--recording", "lab", "hall"], {})):
         folder = tmp_path / f"out{len(flags)}"
         assert main("tests", "About.", EXPERIMENTS, ["tried", *flags, "-o", str(folder)], fingerprint=lambda _: {"film": [1.0]}) == 0
         assert json.loads((folder / "tried.json").read_text("utf-8"))["fingerprint"] == wanted
