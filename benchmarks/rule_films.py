@@ -248,7 +248,7 @@ def _measured(film: Film, seed: int, arguments: argparse.Namespace) -> dict[str,
     return found | {"lines": {file: numbers for file, numbers in files.items() if numbers}}
 
 
-def main() -> None:
+def run() -> None:
     """Parse, track, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
@@ -271,4 +271,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run()

@@ -81,7 +81,7 @@ def test_costs_get_whole_poses_and_what_is_reported_stays_that_of_the_silhouette
 
 def test_who_was_lost_or_comes_back_is_searched_for_with_the_cost():
     view, empty, calls = picture(), np.zeros_like(masks()[0]), []
-    of, rng = MonocularTracker(view, make_settings("liu2011")), np.random.default_rng(0)
+    of, rng = MonocularTracker(view, make_settings("liu2011", {"recover": True})), np.random.default_rng(0)
     away = of.step(rng, of.start(rng, masks()[0]), empty, nothing)
     assert away.status == "absent"
 

@@ -223,13 +223,13 @@ def test_only_the_poses_that_cost_least_after_the_coarse_iterations_go_through_t
     poses = of.body.skeleton.clamp(last + spread * np.random.default_rng(0).standard_normal((particles, len(last))))
     refine = of.refine(observation, last)
     assert refine is not None
-    proposed, refined = refine(poses)
+    chosen, refined = refine(poses)
     g, (centre, pull) = of.settings.gauss_newton, of.posture_prior.quadratic(last, of.settings.gauss_newton.pull, of.settings.posture)
     coarse = Pass(observation.cloud(g.share), g.coarse, g.coarse_tau, observation.space, g.emptiness)
     rough, costs = of.refiner.descend(poses, coarse, centre, pull)
     assert of.refiner.descend(rough, coarse._replace(iterations=0), centre, pull)[1] == pytest.approx(costs)
     best = costs.argsort()[:number] if number < particles else np.arange(particles)
-    assert (proposed == poses[best]).all()
+    assert (poses[chosen] == poses[best]).all()
     fine = Pass(observation.full, g.fine, g.fine_tau, observation.space, g.emptiness)
     assert refined == pytest.approx(of.refiner.gauss_newton(poses, (coarse, fine), centre, pull)[best], abs=1e-4)
 
