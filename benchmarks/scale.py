@@ -68,7 +68,7 @@ def row(spec: Spec) -> tuple[str, list[bool], list[bool]]:
     cameras, masks = silhouettes(spec)
     settings, true = MultiviewSettings(), spec.body.stature
     moments = moments_of(cameras, masks, settings)
-    heights = fitted_heights(cameras, moments, settings)
+    heights = np.array([*fitted_heights(cameras, moments, settings)])
 
     def is_named(factor: float, height: float | None) -> bool:
         quick = stands([factor * moment.extents for moment in moments], height)

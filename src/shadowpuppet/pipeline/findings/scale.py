@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -85,7 +85,12 @@ def scale_error(cameras: Sequence[Camera], moments: Sequence[Moment], settings: 
     """
     if stands([moment.extents for moment in moments], height):
         return None
-    return judged(fitted_heights(cameras, moments, settings), height)
+    (low, high), heights = _limits(height), list[float]()
+    for found in fitted_heights(cameras, moments, settings):
+        heights.append(found)
+        if 2 * sum(low < each < high for each in heights) >= len(moments):
+            return None  # whatever the other moments say: a fit takes seconds
+    return judged(np.array(heights), height)
 
 
 def moments_of(cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]], settings: MultiviewSettings) -> list[Moment]:
@@ -107,10 +112,10 @@ def is_slender(extents: Array) -> bool:
     return bool(longest > SLENDER * (second * third) ** 0.5)
 
 
-def fitted_heights(cameras: Sequence[Camera], moments: Sequence[Moment], settings: MultiviewSettings) -> Array:
-    """The heights (F,), metres, of bodies fitted to the moments that a body fits."""
+def fitted_heights(cameras: Sequence[Camera], moments: Sequence[Moment], settings: MultiviewSettings) -> Iterator[float]:
+    """The heights, metres, of bodies fitted to the moments that a body fits."""
     fitted = (seen_stature(np.random.default_rng(0), cameras, moment.masks, settings) for moment in moments)
-    return np.array([each.height for each in fitted if each is not None])
+    return (each.height for each in fitted if each is not None)
 
 
 def judged(heights: Array, height: float | None) -> ScaleError | None:
