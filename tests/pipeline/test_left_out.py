@@ -74,7 +74,7 @@ def test_what_the_body_leaves_unexplained_and_never_moves_belongs_to_the_scene(b
 
 
 def test_a_second_look_that_finds_nothing_more_examines_no_recording_again(beside_cabinet, monkeypatch):
-    """A kept survey has no films: they are examined anew, with what was added before."""
+    """A kept survey has no films: they are examined again, with what was added before."""
     options = Options()
     rig = open_rig(beside_cabinet, options)
     survey = survey_camera(rig, options)

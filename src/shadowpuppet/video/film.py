@@ -31,7 +31,7 @@ FULL_RANGE = 2
 EVEN = 0.25
 """Greatest difference of a steady film's times from even ones, over their interval: a missing frame makes half."""
 NOT_LATER = "one that is not later"
-"""In a message about such frames, of which a terminal shows one for all films of a recording."""
+"""Words of the warning about such frames; a terminal shows the warning once for all films of a recording."""
 LONGEST_STUTTER = 1.0
 """Seconds; times that go back by more are taken for a restart of the clock."""
 STUDIO_TO_FULL = np.clip(np.round((np.arange(256) - 16) * (255 / 219)), 0, 255).astype(np.uint8)

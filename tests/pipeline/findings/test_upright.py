@@ -1,4 +1,4 @@
-"""A world whose Z is not up is told by a person who walks: they lie, or stand on the head."""
+"""A walk shows that the world's Z is not up: the person lies, or stands on the head."""
 
 from __future__ import annotations
 

@@ -55,10 +55,9 @@ class ScaleError:
         usual = f"the {self.expected:.2f} m that are given" if self.is_known else f"the {self.expected:.2f} m of most people"
         remedy = ("`shadowpuppet check --fix` divides every translation by that" if self.is_known else
                   "give the person's --height, and `shadowpuppet check --fix` mends it")
-        return Finding(f"the calibration makes the person {self.height:.2f} m tall: the board's square? All lengths are {within} times too "
-                       f"large by {usual}; measure the square and calibrate again, or {remedy}" if self.factor > 1 else
-                       f"the calibration makes the person {self.height:.2f} m tall: the board's square? All lengths are too small, "
-                       f"{within} times what they should be by {usual}; measure the square and calibrate again, or {remedy}",
+        off = f"{within} times too large" if self.factor > 1 else f"too small, {within} times what they should be"
+        return Finding(f"the calibration makes the person {self.height:.2f} m tall: the board's square? All lengths are {off} by {usual}; "
+                       f"measure the square and calibrate again, or {remedy}",
                        f"calibration's scale is wrong, {self.factor:.2f} times: the board's square?", RUINOUS)
 
 

@@ -61,7 +61,7 @@ class Verdict(NamedTuple):
 
 
 def ranked(findings: Iterable[Finding]) -> list[Finding]:
-    """Findings in the order in which they are told: the gravest first; those of one severity keep their order."""
+    """Findings in the order of a report: the gravest first; those of one severity keep their order."""
     return sorted(findings, key=lambda each: -each.severity)
 
 

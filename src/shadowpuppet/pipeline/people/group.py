@@ -172,7 +172,7 @@ class Group:
 
     def colours(self, people: PeopleState, bodies: Mapping[int, Drawn], free: Sequence[Figure],
                 frames: Frames) -> tuple[Identity, list[Colours]]:
-        """What people wear, seen where nobody else is; and what the free figures do."""
+        """The identity with the clothes of tracked people, where no other person overlaps them; and the colours of the free figures."""
         cameras, masks, identity = self.floor.cameras, frames.seen.masks, people.identity
         beside = {number: body.masks_near() for number, body in bodies.items()}
         figures = [drawn(self.floor, figure) for figure in free]

@@ -114,7 +114,7 @@ class PeopleState(NamedTuple):
     """When people are looked for again, seconds."""
     identity: Identity = Identity()
     exchanges: tuple[Exchange, ...] = ()
-    """People who were exchanged, as their colours told later."""
+    """Exchanges of two people that the colours of their clothes showed later."""
 
     @property
     def present(self) -> list[PersonState]:

@@ -1,5 +1,5 @@
 """The height that one frame's silhouettes ask for in the calibration's world, whatever the world's scale, and however the person sits or
-stands: a body of average proportions is fitted, of which stature and girth are free."""
+stands: a body of average proportions is fitted with free stature and girth."""
 
 from __future__ import annotations
 
