@@ -1,0 +1,1 @@
+"""Keypoints of whole films, a module a format."""
