@@ -31,7 +31,8 @@ class Gathered:
 
     def __init__(self, names: Sequence[str], detector: str, size: tuple[int, int], raw: bool = False) -> None:
         """Names of the K landmarks, as the file has them; detector and model; the film's size. `raw`: confidences are a network's scores,
-        which are not bounded (OpenPose's reach 1.4, those of SimCC 10), and are clipped to 0 to 1. Raises `ShadowPuppetError` if no landmark is known."""
+        which are not bounded (OpenPose's reach 1.4, those of SimCC 10), and are clipped to 0 to 1. Raises `ShadowPuppetError` if no
+        landmark is known."""
         self.known = known_names(names)
         self.detector, self.size, self.raw = detector, size, raw
         self._frames, self._persons, self._points = list[int](), list[int](), list[NDArray[np.float32]]()
