@@ -24,6 +24,8 @@ import vicon
 from shadowpuppet.body.models import MODELS, average_sizes
 from shadowpuppet.calibration.boards.board import board_from, board_text, read_board
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.external import script
+from shadowpuppet.external.script import read_script
 from shadowpuppet.io.calibration.calibration_files import examine_calibration, write_calibration
 from shadowpuppet.io.calibration.formats import is_calibration
 from shadowpuppet.io.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
@@ -43,8 +45,6 @@ from shadowpuppet.io.run import read_run
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.batch.grid import read_grid
 from shadowpuppet.pipeline.options import make_options, options_text, read_options
-from shadowpuppet.silhouette.external import script
-from shadowpuppet.silhouette.external.script import read_script
 from shadowpuppet.synthetic import demo_spec, read_spec, spec_text
 from shadowpuppet.video import open_frames, read_image, write_frames, write_image
 
@@ -133,8 +133,8 @@ def write(folder: Path) -> None:
     (folder / "grid" / "grid.toml").write_text(GRID)
     (folder / "spec" / "spec.toml").write_text(spec_text(demo_spec()))
     scripts = Path(script.__file__).parent / "scripts"
-    for path in scripts.glob("*.py"):
-        (folder / "script" / path.name).write_bytes(path.read_bytes())
+    for path in scripts.rglob("*.py"):
+        (folder / "script" / f"{path.parent.name}_{path.name}").write_bytes(path.read_bytes())
     frame = MotionFrame(0.1, "tracked", rng.random(4), np.asfortranarray(rng.random((3, 3))))
     write_checkpoint(folder / "checkpoint", Checkpoint(1, (frame, {"a": None, "b": True}, np.float64(2))))
     for ending in ("png", "jpg", "bmp", "tif", "webp"):

@@ -39,6 +39,8 @@ import smallest  # noqa: E402
 from speed.chain import ONE_THREAD_EACH  # noqa: E402
 from triangulation import LANDMARKS, SEEN, one_camera, several_cameras  # noqa: E402
 
+from shadowpuppet.external.environment import command_for, variables  # noqa: E402
+from shadowpuppet.external.script import read_script  # noqa: E402
 from shadowpuppet.geometry import Array, align  # noqa: E402
 from shadowpuppet.io.files.npz import read_members  # noqa: E402
 from shadowpuppet.io.motion.motion_files import read_truth  # noqa: E402
@@ -48,8 +50,6 @@ from shadowpuppet.motion.metrics import FAR_ERROR, LIMB_JOINTS, LOST_ERROR, join
 from shadowpuppet.motion.motion import JointTable  # noqa: E402
 from shadowpuppet.pipeline.options import make_options  # noqa: E402
 from shadowpuppet.pipeline.track import track_recording  # noqa: E402
-from shadowpuppet.silhouette.external.environment import command_for, variables  # noqa: E402
-from shadowpuppet.silhouette.external.script import read_script  # noqa: E402
 
 SCRIPT, PAGE = HERE / "mediapipe_landmarks.py", HERE.parents[1] / "docs" / "comparison.md"
 ARMS = LIMB_JOINTS[:6]

@@ -63,7 +63,7 @@ class RecordingError(ShadowPuppetError):
 
 
 class SilhouetteError(ShadowPuppetError):
-    """No usable silhouette can be made."""
+    """No usable silhouettes or keypoints can be made."""
 
 
 class TrackingError(ShadowPuppetError):

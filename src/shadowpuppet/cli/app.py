@@ -16,7 +16,7 @@ from shadowpuppet.removed import refuse_tokens
 COMMANDS = {
     "track": "track:track", "live": "track:live", "play": "track:play", "demo": "track:demo", "fit-person": "track:fit_person",
     "info": "recordings:info", "synthesize": "recordings:synthesize",
-    "masks": "recordings:masks",
+    "masks": "made:masks", "keypoints": "made:keypoints",
     "calibrate": "calibration.calibrate:calibrate",
     "check": "calibration.check:check", "fit-prior": "motion:fit_prior", "export": "motion:export", "convert": "motion:convert",
     "evaluate": "evaluation:evaluate", "batch": "batch:batch", "view": "viewer:view",
@@ -24,7 +24,7 @@ COMMANDS = {
 }  # fmt: skip
 """Module in this package and function of each command, by the command's name; loaded when used."""
 
-FIRST = ("track", "live", "info", "calibrate", "check", "masks", "view", "evaluate", "export", "synthesize", "demo")
+FIRST = ("track", "live", "info", "calibrate", "check", "masks", "keypoints", "view", "evaluate", "export", "synthesize", "demo")
 """Commands that `--help` lists first; the others are under "More"."""
 _GROUPS = tuple(Group(name, sort_key=n) for n, name in enumerate(("Commands", "More")))
 

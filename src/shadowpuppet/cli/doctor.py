@@ -257,13 +257,14 @@ def _extras() -> Iterator[Examined]:
             yield Examined(f"extra {extra}", "works", f"{purpose}: {', '.join(f'{name} {metadata.version(name)}' for name in names)}")
 
 
-def _external_masks() -> Iterator[Examined]:
-    """Check the program that runs the scripts of `masks`."""
-    from shadowpuppet.silhouette.external.environment import cache_folder, uv_path
+def _scripts() -> Iterator[Examined]:
+    """Check the program that runs the scripts of `masks` and `keypoints`."""
+    from shadowpuppet.external.environment import cache_folder, uv_path
 
     uv = uv_path()
-    told = f"scripts of `masks` are run by uv, {uv}" if uv else f"scripts of `masks` run in environments kept in {cache_folder()}"
-    yield Examined("masks", "works", told, "" if uv else "uv (pip install uv) would also bring the version of Python that a script needs")
+    how = f"are run by uv, {uv}" if uv else f"run in environments kept in {cache_folder()}"
+    remedy = "" if uv else "uv (pip install uv) would also bring the version of Python that a script needs"
+    yield Examined("scripts", "works", f"scripts of `masks` and `keypoints` {how}", remedy)
 
 
 def _browser() -> Iterator[Examined]:
@@ -312,6 +313,6 @@ CHECKS: tuple[tuple[str, Callable[[], Iterator[Examined]], bool], ...] = (
     ("Python", _python, True), ("libraries", _libraries, True),
     ("kernels", _kernels, True), ("compiled code", _cache, False),
     ("films", _films, True), ("codecs", _codecs, False), ("processor", _processor, False), ("extras", _extras, False),
-    ("masks", _external_masks, False), ("browser", _browser, False), ("cameras", _cameras, False),
+    ("scripts", _scripts, False), ("browser", _browser, False), ("cameras", _cameras, False),
 )  # fmt: skip
 """Name, function, whether tracking needs it."""

@@ -1,9 +1,7 @@
-"""The commands about recordings: `info` describes one; `synthesize` and `masks` make one."""
+"""The commands about recordings: `info` describes one; `synthesize` makes one."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,7 +27,7 @@ from shadowpuppet.cli.flags import (
     unpacked,
 )
 from shadowpuppet.cli.tables import pairs, show, show_json, show_next
-from shadowpuppet.errors import SettingsError, ShadowPuppetError, choices, reason, typed
+from shadowpuppet.errors import SettingsError, ShadowPuppetError, choices, typed
 from shadowpuppet.output import say_text
 from shadowpuppet.settings import validate
 from shadowpuppet.synthetic.collection import named_specs
@@ -38,7 +36,6 @@ from shadowpuppet.synthetic.spec_changes import SpecChanges, apply_changes
 from shadowpuppet.synthetic.spec_file import read_spec
 
 if TYPE_CHECKING:
-    from shadowpuppet.io.masks.segmentation import MadeMasks
     from shadowpuppet.io.recording import Recording
 
     SpecFlags = Any
@@ -114,47 +111,6 @@ def synthesize(spec: Annotated[Path | None, Parameter(help="Spec file, TOML, as 
                   typed("synthesize", recording.path / "spec.toml", "-o", "FOLDER"))
 
 
-def masks(source: Annotated[Path | None, Parameter(help="Folder with video/, or a film or folder of pictures.")] = None, /, *,
-          script: Annotated[str, flag("What makes the masks: a shipped script's name (--list), or the path of one of yours "
-                                      "(--template).", name="--with")] = "mediapipe",
-          folder: Annotated[Path | None, output("Folder of the new recording, or the recording's own. [default: its name and -masks]")]
-          = None,
-          calibration: Annotated[Path | None, flag("Calibration, if the recording has none or another.", CAMERAS)] = None,
-          camera: Annotated[str | None, flag("Cameras, by name, with commas between; all by default.", CAMERAS)] = None,
-          list_scripts: Annotated[bool, switch("List the shipped scripts and stop.", name="--list")] = False,
-          template: Annotated[Path | None, flag("Write a script to start from into this file and stop.")] = None,
-          force: Annotated[bool, switch("Replace masks that are there.")] = False, quiet: Quiet = False) -> None:  # fmt: skip
-    """Let another program make the silhouettes, such as a neural network, in an environment of its own; then `track` them with --masks.
-
-    The script is code of others that you choose: it runs with your rights. Its packages are installed into an environment of their own when
-    it is first used (by uv if that is there), and kept.
-    """
-    from shadowpuppet.cli.terminal import terminal
-    from shadowpuppet.pipeline.footage import chosen_views
-    from shadowpuppet.silhouette.external.script import TEMPLATE, find_script, shipped_scripts
-
-    if list_scripts:
-        return show(pairs(shipped_scripts().items()))
-    if template is not None:
-        return _write_new(template, TEMPLATE.read_text("utf-8"))
-    if source is None:
-        raise SettingsError("masks: found no recording, expected its folder, a film or a folder of pictures; or --list or --template")
-    from shadowpuppet.io.masks.masked_recording import check_room, readable_recording
-    from shadowpuppet.io.masks.segmentation import make_masks
-
-    chosen = find_script(script)
-    recording, calibrated = readable_recording(source, calibration)
-    recording = replace(recording, views=chosen_views(recording, camera))
-    folder = folder or Path(f"{recording.name}-masks")
-    check_room(folder, recording, force)
-    with terminal(quiet) as listener:
-        made = make_masks(recording, chosen, folder, listener, listener.note, calibrated=calibrated, replaced=force)
-    if not quiet:
-        show(_masks_table(recording, chosen.name, folder, made))
-        flags = ("--masks", *(() if calibrated else ("--fov", "DEGREES")))
-        show_next(typed("info", folder, *flags), typed("track", folder, *flags, "--overlay"))
-
-
 def spec_of(path: Path | None, like: str | None, seed: int | None, flags: Any) -> Spec:
     """Spec of a synthetic recording: a file or a named spec, changed by flags. Raises `SettingsError`."""
     if path is not None and like is not None:
@@ -188,26 +144,6 @@ def _recording_table(spec: Spec, recording: Recording) -> Any:
         *([("faults", ", ".join(dict.fromkeys(fault.kind for fault in spec.faults)))] if spec.faults else []),
         ("truth", ", ".join(["truth.csv, truth.trc, masks/", *(name for name, there in also.items() if there)])),
     ])  # fmt: skip
-
-
-def _masks_table(recording: Recording, script: str, folder: Path, made: Sequence[MadeMasks]) -> Any:
-    """Table of the masks that were made."""
-    frames, seconds = sum(one.frames for one in made), sum(one.seconds for one in made)
-    return pairs([
-        ("recording", str(folder)), ("masks", f"by {script}: {frames} frames, {frames / max(seconds, 1e-9):.1f} a second"),
-        *((one.camera, f"person found in {100 * (1 - one.empty / max(one.frames, 1)):.0f} % of {one.frames} frames") for one in made),
-    ])  # fmt: skip
-
-
-def _write_new(path: Path, text: str) -> None:
-    """Write a file that is not there yet. Raises `SettingsError`."""
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise SettingsError(f"{path}: found a file there, expected a new name") from None
-    except OSError as error:
-        raise SettingsError(f"{path}: cannot be written ({reason(error)})") from None
 
 
 def _gestures(spec: Spec) -> str:

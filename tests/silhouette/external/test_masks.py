@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.errors import SilhouetteError, VideoError
+from shadowpuppet.external.pipes import FilmScript
 from shadowpuppet.silhouette.external.masks import external_masks
 
 SIZE = (12, 8)
@@ -22,7 +23,7 @@ BRIGHT = LOOP + "out.write(bytes(255 * (value >= 60) for value in data[::3]))\n"
 
 def masks(tmp_path, text, frames=FRAMES):
     (tmp_path / "mine.py").write_text(text)
-    return external_masks([sys.executable, "-S", str(tmp_path / "mine.py")], "mine.py", FILM, SIZE, frames)
+    return external_masks(FilmScript([sys.executable, "-S", str(tmp_path / "mine.py")], "mine.py", FILM, SIZE), frames)
 
 
 def refused(tmp_path, text, frames=FRAMES):
@@ -81,7 +82,7 @@ def test_a_failing_script_is_quoted(tmp_path):
 
 def test_a_program_that_is_not_there():
     with pytest.raises(SilhouetteError, match=r"mine.py: gone/python cannot be started \(no such file"):
-        next(external_masks(["gone/python", "mine.py"], "mine.py", FILM, SIZE, FRAMES))
+        next(external_masks(FilmScript(["gone/python", "mine.py"], "mine.py", FILM, SIZE), FRAMES))
 
 
 def test_the_film_s_errors_are_raised_as_they_are(tmp_path):

@@ -1,1 +1,1 @@
-"""Recordings whose silhouettes another program made."""
+"""Silhouettes that another program made."""

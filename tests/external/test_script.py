@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shadowpuppet.errors import SilhouetteError
-from shadowpuppet.silhouette.external.script import TEMPLATE, accepts, find_script, read_script, shipped_scripts
+from shadowpuppet.external.script import accepts, find_script, read_script, shipped_scripts, template
 
 HEAD = '# /// script\n# requires-python = "{}"\n# dependencies = {}\n# ///\n'
 VERSIONS = st.tuples(st.just(3), st.integers(0, 20), st.integers(0, 30))
@@ -18,23 +18,28 @@ def script(path, text):
     return read_script(path, path.name)
 
 
-def test_mediapipe_is_shipped_with_its_versions():
-    found = find_script("mediapipe")
+KINDS = ("masks", "keypoints")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_mediapipe_is_shipped_with_its_versions(kind):
+    found = find_script("mediapipe", kind)
     assert found.requirements == ("mediapipe==0.10.21",)
     assert accepts(found.pythons, (3, 12, 1))
     assert not accepts(found.pythons, (3, 13, 0))
-    assert "Apache-2" in shipped_scripts()["mediapipe"]
+    assert "Apache-2" in shipped_scripts(kind)["mediapipe"]
 
 
-def test_the_template_is_a_script_of_its_own_and_not_listed():
-    assert TEMPLATE.stem not in shipped_scripts()
-    assert read_script(TEMPLATE, "template").requirements == ("numpy>=1.26",)
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_template_is_a_script_of_its_own_and_not_listed(kind):
+    assert template(kind).stem not in shipped_scripts(kind)
+    assert read_script(template(kind), "template").requirements == ("numpy>=1.26",)
 
 
 def test_a_script_may_ask_for_nothing(tmp_path):
     found = script(tmp_path / "mine.py", "print()\n")
     assert (found.requirements, found.pythons) == ((), "")
-    assert found == find_script(str(tmp_path / "mine.py"))
+    assert found == find_script(str(tmp_path / "mine.py"), "masks")
 
 
 def test_a_block_at_the_very_end_of_a_file_counts(tmp_path):
@@ -61,10 +66,10 @@ def test_wrong_metadata_are_refused(tmp_path, text, found):
 
 def test_an_unknown_name_lists_those_that_there_are(tmp_path):
     with pytest.raises(SilhouetteError, match=r"found 'sam', .* or one of mediapipe"):
-        find_script("sam")
+        find_script("sam", "masks")
     (tmp_path / "mask.png").write_bytes(b"\x89PNG\xff")
     with pytest.raises(SilhouetteError, match="no text at position 0"):
-        find_script(str(tmp_path / "mask.png"))
+        find_script(str(tmp_path / "mask.png"), "masks")
 
 
 @given(VERSIONS, VERSIONS)

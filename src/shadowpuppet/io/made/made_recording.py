@@ -1,11 +1,11 @@
-"""Writes recordings whose silhouettes another program made: films linked, masks written."""
+"""Writes recordings whose masks or keypoints another program made: films linked, what was made written."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +16,17 @@ from shadowpuppet.errors import RecordingError, reason
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.recording import Recording, View, read_recording
-from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES, camera_number, open_frames, write_frames
+from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES, FrameWriter, camera_number, open_frames, write_frames
 from shadowpuppet.video.frames import ASSUMED_RATE
 
 MADE_BY = "made_by.toml"
-"""File beside masks that says what made them."""
+"""File beside masks or keypoints that says what made them."""
 OF_RECORDINGS = ("video", "recording.toml", "calibration.toml")
 """What is in a recording's folder, unlike in a folder of pictures."""
 
 
 def readable_recording(source: str | Path, calibration: Path | None = None) -> tuple[Recording, bool]:
-    """A recording or film for which masks are to be made, and whether it is calibrated; a single film need not be.
+    """A recording or film for which something is to be made, and whether it is calibrated; a single film need not be.
 
     Raises `RecordingError`, `CalibrationError` or `VideoError`.
     """
@@ -37,7 +37,7 @@ def readable_recording(source: str | Path, calibration: Path | None = None) -> t
         try:
             if calibration is not None:
                 raise error
-            found, calibrated = read_recording(source, fov=1.0), False  # the field of view has no effect on masks
+            found, calibrated = read_recording(source, fov=1.0), False  # the field of view has no effect on either
         except RecordingError:
             raise error from None
     for view in found.views:
@@ -48,62 +48,84 @@ def readable_recording(source: str | Path, calibration: Path | None = None) -> t
 
 def write_masked_recording(recording: Recording, folder: Path, masks: Callable[[View], Iterable[Mask]], *, calibrated: bool = True,
                            replaced: bool = False, made_by: dict[str, Any] | None = None) -> None:
-    """Write a recording folder with a recording's films (linked) and the masks that `masks` makes of each view, completely or not at all.
+    """Write a recording folder as `write_made_recording` does, with masks (H, W) of every frame of each view's film."""
+    def write(part: Path) -> None:
+        for view in recording.views:
+            with mask_film(recording, view, part) as film:
+                for mask in masks(view):
+                    write_mask(film, mask)
 
-    Into the recording's own folder only masks/ is written. masks: masks (H, W) of every frame of the view's film. calibrated: whether to
-    write the cameras. replaced: whether masks that are there may be replaced. made_by: plain values for masks/made_by.toml. Raises
-    `RecordingError` if something is in the way or cannot be written, and the errors of `masks`.
+    write_made_recording(recording, folder, ("masks",), write, calibrated=calibrated, replaced=replaced, made_by=made_by)
+
+
+def mask_film(recording: Recording, view: View, folder: Path) -> FrameWriter:
+    """A film to be written with the masks of a view's frames, masks/<camera>.mkv in a folder."""
+    rate = open_frames(view.video, rate=recording.rate).rate
+    return write_frames(folder / "masks" / f"{view.camera.name}.mkv", rate if np.isfinite(rate) else ASSUMED_RATE, lossless=True)
+
+
+def write_mask(film: FrameWriter, mask: Mask) -> None:
+    """Write a mask (H, W) into such a film."""
+    film.write(np.multiply(mask, 255, dtype=np.uint8))
+
+
+def write_made_recording(recording: Recording, folder: Path, kinds: Sequence[str], write: Callable[[Path], None], *,
+                         calibrated: bool = True, replaced: bool = False, made_by: dict[str, Any] | None = None) -> None:
+    """Write a recording folder with a recording's films (linked) and what `write` makes of them, completely or not at all.
+
+    Into the recording's own folder only the `kinds`' folders are written, some of masks/ and keypoints/. write: writes into these in a
+    folder that it is given, where they are empty. calibrated: whether to write the cameras. replaced: whether what is there may be
+    replaced. made_by: plain values for made_by.toml in each of them. Raises `RecordingError` if something is in the way or cannot be
+    written, and the errors of `write`.
     """
-    own = check_room(folder, recording, replaced)
+    import tomli_w
+
+    own = check_room(folder, recording, replaced, kinds)
     try:
         folder.absolute().parent.mkdir(parents=True, exist_ok=True)
         part = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder if own else folder.absolute().parent))
     except OSError as error:
         raise RecordingError(f"{folder}: cannot be made ({reason(error)})") from None
     try:
-        _write_masks(recording, part / "masks", masks, made_by or {})
+        for kind in kinds:
+            (part / kind).mkdir()
+        write(part)
+        for kind in kinds:
+            write_whole(part / kind / MADE_BY, tomli_w.dumps(made_by or {}))
         if not own:
-            _write_rest(recording, part, calibrated)
-        _put_in_place(part, folder, own)
+            _write_rest(recording, part, calibrated, kinds)
+        _put_in_place(part, folder, own, kinds)
     except OSError as error:
         raise RecordingError(f"{folder}: cannot be written ({reason(error)})") from None
     finally:
         shutil.rmtree(part, ignore_errors=True)
 
 
-def check_room(folder: Path, recording: Recording, replaced: bool) -> bool:
+def check_room(folder: Path, recording: Recording, replaced: bool, kinds: Sequence[str] = ("masks",)) -> bool:
     """Whether `folder` is the recording's own. Raises `RecordingError` if something is in the way."""
-    there = folder / "masks"
     if folder.is_dir() and folder.resolve() == recording.path.resolve() and any((folder / name).exists() for name in OF_RECORDINGS):
-        if there.exists() and not replaced:
-            raise RecordingError(f"{there}: found masks there already; choose another folder with -o, or replace them with --force")
+        there = [kind for kind in kinds if (folder / kind).exists()]
+        if there and not replaced:
+            raise RecordingError(f"{folder / there[0]}: found {there[0]} there already; choose another folder with -o, or replace them "
+                                 "with --force")
         return True
     if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
         raise RecordingError(f"{folder}: found other files there, expected a new folder, or the recording's own")
     return False
 
 
-def _write_masks(recording: Recording, folder: Path, masks: Callable[[View], Iterable[Mask]], made_by: dict[str, Any]) -> None:
-    import tomli_w
-
-    folder.mkdir()
-    for view in recording.views:
-        rate = open_frames(view.video, rate=recording.rate).rate
-        with write_frames(folder / f"{view.camera.name}.mkv", rate if np.isfinite(rate) else ASSUMED_RATE, lossless=True) as film:
-            for mask in masks(view):
-                film.write(np.multiply(mask, 255, dtype=np.uint8))
-    write_whole(folder / MADE_BY, tomli_w.dumps(made_by))
-
-
-def _write_rest(recording: Recording, folder: Path, calibrated: bool) -> None:
-    """Link films, empty scenes, truth, training and references; write calibration and recording.toml."""
+def _write_rest(recording: Recording, folder: Path, calibrated: bool, made: Sequence[str]) -> None:
+    """Link films, empty scenes, masks that were not made, truth, training and references; write calibration and recording.toml."""
     import tomli_w
 
     notes: dict[str, Any] = {key: value for key, value in (("rate", recording.rate), ("duration", recording.duration)) if value is not None}
     subject = {"height": recording.subject.height, "distance": recording.subject.distance}
     notes["subject"] = {key: value for key, value in subject.items() if value is not None}
     notes["start"] = {view.camera.name: view.start for view in recording.views if view.start}
-    for kind, known in (("video", FILM_SUFFIXES), ("background", FILM_SUFFIXES + IMAGE_SUFFIXES)):
+    pictures = FILM_SUFFIXES + IMAGE_SUFFIXES
+    for kind, known in (("video", FILM_SUFFIXES), ("background", pictures), ("masks", pictures)):
+        if kind in made:
+            continue
         sources = {view.camera.name: Path(str(getattr(view, kind))) for view in recording.views if getattr(view, kind) is not None}
         notes[kind] = {}
         for name, source in sources.items():
@@ -134,14 +156,15 @@ def link(source: Path, place: Path) -> None:
             shutil.copy2(source, place)
 
 
-def _put_in_place(part: Path, folder: Path, own: bool) -> None:
-    """Give what is complete its name; masks that it replaces are removed only then."""
+def _put_in_place(part: Path, folder: Path, own: bool, kinds: Sequence[str]) -> None:
+    """Give what is complete its name; what it replaces is removed only then."""
     if not own:
         part.chmod(0o755)  # temporary folders are the user's alone
         if folder.exists():
             folder.rmdir()
         os.replace(part, folder)
         return
-    if (folder / "masks").exists():
-        os.replace(folder / "masks", part / "old")
-    os.replace(part / "masks", folder / "masks")
+    for kind in kinds:
+        if (folder / kind).exists():
+            os.replace(folder / kind, part / f"old {kind}")
+        os.replace(part / kind, folder / kind)

@@ -10,9 +10,9 @@ import sys
 import pytest
 
 from shadowpuppet.errors import SilhouetteError
-from shadowpuppet.silhouette.external import environment
-from shadowpuppet.silhouette.external.environment import cache_folder, command_for, last_words, variables
-from shadowpuppet.silhouette.external.script import Script
+from shadowpuppet.external import environment
+from shadowpuppet.external.environment import cache_folder, command_for, last_words, variables
+from shadowpuppet.external.script import Script
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="the programs on the path are shell scripts here")
 

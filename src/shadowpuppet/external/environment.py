@@ -1,4 +1,4 @@
-"""The environment in which a segmentation script runs: uv's, or a virtual environment made once and kept."""
+"""The environment in which a script runs: uv's, or a virtual environment made once and kept."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from shadowpuppet.errors import SilhouetteError, reason
-from shadowpuppet.silhouette.external.script import Script, accepts
+from shadowpuppet.external.script import Script, accepts
 
 OTHERS = tuple(f"python3.{minor}" for minor in range(14, 8, -1))
 """Interpreters that are looked for if the running one does not suit a script."""

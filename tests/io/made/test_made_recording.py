@@ -10,7 +10,7 @@ import pytest
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SilhouetteError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.io.masks.masked_recording import MADE_BY, link, readable_recording, write_masked_recording
+from shadowpuppet.io.made.made_recording import MADE_BY, link, readable_recording, write_masked_recording
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.video import open_frames, write_frames, write_image
 

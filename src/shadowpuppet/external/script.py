@@ -1,4 +1,4 @@
-"""Segmentation scripts: the shipped ones by name, a user's by path, and what their inline metadata (PEP 723) ask for."""
+"""Scripts that make masks or keypoints: the shipped ones by name, a user's by path, and what their inline metadata (PEP 723) ask for."""
 
 from __future__ import annotations
 
@@ -10,14 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shadowpuppet.errors import SilhouetteError, check_regular, choices, reason
+from shadowpuppet.errors import FILE_MEMORY, SilhouetteError, check_regular, choices, reason
 
 SHIPPED = Path(__file__).parent / "scripts"
-"""Folder of the scripts that come with the package."""
-TEMPLATE = SHIPPED / "template.py"
-"""A script to start from."""
-LONGEST = 1_000_000
-"""Greatest size of a script, bytes."""
+"""Folder of the scripts that come with the package, in a folder for each kind: masks, keypoints."""
 BLOCK = re.compile(r"(?m)^# /// (?P<type>[a-zA-Z0-9-]+)$\s(?P<content>(^#(| .*)$\s)+)^# ///$")
 """A block of inline metadata, as PEP 723 defines it."""
 CLAUSE = re.compile(r"\s*(?P<relation>~=|==|!=|<=|>=|<|>)\s*(?P<numbers>\d+(\.\d+)*)(?P<any>\.\*)?\s*")
@@ -26,7 +22,7 @@ CLAUSE = re.compile(r"\s*(?P<relation>~=|==|!=|<=|>=|<|>)\s*(?P<numbers>\d+(\.\d
 
 @dataclass(frozen=True)
 class Script:
-    """A segmentation script."""
+    """A script that makes masks or keypoints."""
 
     name: str
     """Name of a shipped script, or the file's name."""
@@ -37,17 +33,23 @@ class Script:
     """Versions of Python that it runs on, such as `>=3.11,<3.13`; empty for all."""
 
 
-def shipped_scripts() -> dict[str, str]:
-    """What each shipped script is, its docstring's first line, by name."""
-    paths = sorted(path for path in SHIPPED.glob("*.py") if path != TEMPLATE)
+def template(kind: str) -> Path:
+    """A script of a kind to start from."""
+    return SHIPPED / kind / "template.py"
+
+
+def shipped_scripts(kind: str) -> dict[str, str]:
+    """What each shipped script of a kind is, its docstring's first line, by name."""
+    paths = sorted(path for path in (SHIPPED / kind).glob("*.py") if path != template(kind))
     documented = {path.stem: ast.get_docstring(ast.parse(path.read_text("utf-8"))) or "" for path in paths}
     return {name: text.split("\n")[0] for name, text in documented.items()}
 
 
-def find_script(name: str) -> Script:
-    """The shipped script `name`, or the one in the file `name`. Raises `SilhouetteError` if there is none or its metadata are wrong."""
-    known = shipped_scripts()
-    path = SHIPPED / f"{name}.py" if name in known else Path(name)
+def find_script(name: str, kind: str) -> Script:
+    """The shipped script `name` of a kind, or the one in the file `name`. Raises `SilhouetteError` if there is none or its metadata are
+    wrong."""
+    known = shipped_scripts(kind)
+    path = SHIPPED / kind / f"{name}.py" if name in known else Path(name)
     if not path.is_file():
         raise SilhouetteError(f"--with: found {name!r}, which is no file and no shipped script; expected a script's path, or one of "
                               f"{choices(known)}")
@@ -58,8 +60,8 @@ def read_script(path: Path, name: str) -> Script:
     """The script in a file. Raises `SilhouetteError` if it cannot be read or its inline metadata are wrong."""
     try:
         check_regular(path)
-        if path.stat().st_size > LONGEST:
-            raise SilhouetteError(f"{path}: found {path.stat().st_size} bytes, expected a Python script of at most {LONGEST}")
+        if path.stat().st_size > FILE_MEMORY:
+            raise SilhouetteError(f"{path}: found {path.stat().st_size} bytes, expected a Python script of at most {FILE_MEMORY}")
         text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
     except OSError as error:
         raise SilhouetteError(f"{path}: the script cannot be read ({reason(error)})") from None

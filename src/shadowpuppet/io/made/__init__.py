@@ -1,0 +1,1 @@
+"""Recordings whose masks or keypoints a script makes."""
