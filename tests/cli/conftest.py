@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.cli.tables import show
+from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.video import write_frames
 
 
 @pytest.fixture
@@ -17,3 +21,23 @@ def printed(capsys, monkeypatch):
         return [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
 
     return lines
+
+
+@pytest.fixture
+def alone(monkeypatch, home):
+    """No uv on the path, and an empty cache."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(home / "cache"))
+    monkeypatch.setenv("PATH", str(home / "bin"))
+
+
+@pytest.fixture
+def two(home):
+    """A recording of two cameras, five frames each that become brighter."""
+    folder = home / "lab"
+    for name in ("left", "right"):
+        (folder / "video").mkdir(parents=True, exist_ok=True)
+        with write_frames(folder / "video" / f"{name}.mp4", 10) as writer:
+            for n in range(5):
+                writer.write(np.full((24, 32, 3), 40 * n, np.uint8))
+    write_calibration(folder / "calibration.toml", [Camera.from_fov((32, 24), 1.0, name) for name in ("left", "right")])
+    return folder

@@ -5,12 +5,9 @@ from __future__ import annotations
 import os
 import sys
 
-import numpy as np
 import pytest
 
-from shadowpuppet.camera.camera import Camera
-from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.video import open_frames, write_frames
+from shadowpuppet.video import open_frames
 
 DARK = '''# /// script
 # requires-python = ">=3.11"
@@ -22,23 +19,7 @@ while len(data := sys.stdin.buffer.read(3 * size)) == 3 * size:
 '''
 
 
-@pytest.fixture(autouse=True)
-def alone(monkeypatch, home):
-    """No uv on the path, and an empty cache."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(home / "cache"))
-    monkeypatch.setenv("PATH", str(home / "bin"))
-
-
-@pytest.fixture
-def two(home):
-    folder = home / "lab"
-    for name in ("left", "right"):
-        (folder / "video").mkdir(parents=True, exist_ok=True)
-        with write_frames(folder / "video" / f"{name}.mp4", 10) as writer:
-            for n in range(5):
-                writer.write(np.full((24, 32, 3), 40 * n, np.uint8))
-    write_calibration(folder / "calibration.toml", [Camera.from_fov((32, 24), 1.0, name) for name in ("left", "right")])
-    return folder
+pytestmark = pytest.mark.usefixtures("alone")
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@
 
 shadowpuppet runs it as `script.py FILM WIDTH HEIGHT`, once for each film, in an environment of its own. Frames come from standard input as
 plain bytes, a line of JSON for each goes to standard output. A script is one file: it cannot import others beside it. With --masks it is
-started with one more argument, `masks`, and writes each frame's mask after its line: HEIGHT x WIDTH bytes, 255 is the person, 0 is not.
+started with one more argument, `masks`, and is to write each frame's mask after its line: HEIGHT x WIDTH bytes, 255 is the person.
 """
 
 import json
@@ -20,15 +20,15 @@ import numpy as np  # noqa: E402
 
 FILM, WIDTH, HEIGHT = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 SIZE = WIDTH * HEIGHT * 3
-NAMES = ["head_top"]  # "-" for a landmark that shadowpuppet does not know
-DETECTOR = "highest dark point"
+NAMES = ["mid_hip"]  # "-" for a landmark that shadowpuppet does not know
+DETECTOR = "middle of what is dark"
 ORIGIN = 0  # place of the first pixel's centre: 0.5 where the detector counts pixels' corners
 
 
 def find(image: np.ndarray) -> list:
     """People in a frame (H, W, 3), blue green red: for each name x, y and a confidence from 0 to 1, or None. Here: one at most."""
     rows, columns = np.nonzero(image.mean(2) < 128)
-    return [{"id": 0, "points": [[int(columns[0]), int(rows[0]), 1.0]]}] if len(rows) else []
+    return [{"id": 0, "points": [[columns.mean(), rows.mean(), 1.0]]}] if len(rows) else []
 
 
 def main() -> None:
