@@ -53,6 +53,10 @@ def found(folder, camera="left"):
     return read_npz(folder / "keypoints" / f"{camera}.npz", (32, 24))
 
 
+def mask_means(folder):
+    return [frame.image.mean() for frame in open_frames(folder / "masks" / "left.mkv", grey=True)]
+
+
 def test_a_script_s_keypoints_are_written_beside_linked_films(shell, two, script, home):
     done = shell("keypoints", two, "--with", script(), "--camera", "right")
     assert done.code == 0, done.err
@@ -83,7 +87,7 @@ def test_one_pass_makes_masks_too(shell, two, script, home):
     done = shell("keypoints", two, "--with", script(text=BOTH), "--masks", "-o", "new")
     assert done.code == 0, done.err
     assert "track new --masks" in done.out
-    assert [frame.image.mean() for frame in open_frames(home / "new" / "masks" / "left.mkv", grey=True)] == [0, 255, 0, 255, 0]
+    assert mask_means(home / "new") == [0, 255, 0, 255, 0]
     assert len(found(home / "new").frame) == 4
     assert (home / "new" / "masks" / "made_by.toml").exists()
 
@@ -110,6 +114,8 @@ def test_the_other_kind_is_kept_and_what_is_there_is_replaced_only_if_asked(shel
     (two / "masks" / "left.mkv").write_bytes((two / "video" / "left.mp4").read_bytes())
     assert shell("keypoints", two, "--with", script(), "-o", "new", "--quiet").code == 0
     assert os.path.samefile(home / "new" / "masks" / "left.mkv", two / "masks" / "left.mkv")
+    assert shell("keypoints", two, "--with", script(text=BOTH), "--masks", "-o", "newer", "--quiet").code == 0
+    assert mask_means(home / "newer") == [0, 255, 0, 255, 0]
 
 
 @pytest.mark.parametrize(("people", "head", "more", "said"), [
