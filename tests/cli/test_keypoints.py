@@ -15,6 +15,7 @@ from waiting import until
 
 from shadowpuppet.io.keypoints.film_keypoints import read_npz
 from shadowpuppet.io.made import script_keypoints
+from shadowpuppet.io.recording import read_recording
 from shadowpuppet.video import open_frames
 
 pytestmark = pytest.mark.usefixtures("alone")
@@ -105,11 +106,16 @@ def test_masks_that_are_none_are_refused(shell, two, script, home, text, said):
 
 
 def test_the_other_kind_is_kept_and_what_is_there_is_replaced_only_if_asked(shell, two, script, home):
+    (home / "black.py").write_text("import sys\nsys.stdout.buffer.write(bytes(len(sys.stdin.buffer.read()) // 3))\n")
     assert shell("keypoints", two, "--with", script(), "-o", two, "--quiet").code == 0
     said = shell("keypoints", two, "--with", script(), "-o", two, "--quiet").err
     assert "keypoints: found keypoints there already; choose another folder with -o, or replace them with --force" in said
     assert shell("keypoints", two, "--with", script("[]"), "-o", two, "--quiet", "--force").code == 0
     assert not len(found(two).frame)
+    (two / "recording.toml").write_text('[keypoints]\nmodel = "COCO_17"\n')
+    assert shell("masks", two, "--with", home / "black.py", "-o", "kept", "--quiet").code == 0
+    assert os.path.samefile(home / "kept" / "keypoints" / "left.npz", two / "keypoints" / "left.npz")
+    assert read_recording(home / "kept").views[0].keypoints.model == "COCO_17"
     (two / "masks").mkdir()
     (two / "masks" / "left.mkv").write_bytes((two / "video" / "left.mp4").read_bytes())
     assert shell("keypoints", two, "--with", script(), "-o", "new", "--quiet").code == 0

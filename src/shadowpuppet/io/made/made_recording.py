@@ -15,6 +15,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import RecordingError, reason
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
+from shadowpuppet.io.keypoints.keypoint_files import SUFFIXES, KeypointSource
 from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES, FrameWriter, camera_number, open_frames, write_frames
 from shadowpuppet.video.frames import ASSUMED_RATE
@@ -23,6 +24,9 @@ MADE_BY = "made_by.toml"
 """File beside masks or keypoints that says what made them."""
 OF_RECORDINGS = ("video", "recording.toml", "calibration.toml")
 """What is in a recording's folder, unlike in a folder of pictures."""
+ENDINGS = {"video": FILM_SUFFIXES, "background": FILM_SUFFIXES + IMAGE_SUFFIXES, "masks": FILM_SUFFIXES + IMAGE_SUFFIXES,
+           "keypoints": SUFFIXES}
+"""Endings of the files that are found by their names, by folder."""
 
 
 def readable_recording(source: str | Path, calibration: Path | None = None) -> tuple[Recording, bool]:
@@ -115,24 +119,14 @@ def check_room(folder: Path, recording: Recording, replaced: bool, kinds: Sequen
 
 
 def _write_rest(recording: Recording, folder: Path, calibrated: bool, made: Sequence[str]) -> None:
-    """Link films, empty scenes, masks that were not made, truth, training and references; write calibration and recording.toml."""
+    """Link films, empty scenes, masks and keypoints but those made, truth, training, references; write calibration and recording.toml."""
     import tomli_w
 
     notes: dict[str, Any] = {key: value for key, value in (("rate", recording.rate), ("duration", recording.duration)) if value is not None}
     subject = {"height": recording.subject.height, "distance": recording.subject.distance}
     notes["subject"] = {key: value for key, value in subject.items() if value is not None}
     notes["start"] = {view.camera.name: view.start for view in recording.views if view.start}
-    pictures = FILM_SUFFIXES + IMAGE_SUFFIXES
-    for kind, known in (("video", FILM_SUFFIXES), ("background", pictures), ("masks", pictures)):
-        if kind in made:
-            continue
-        sources = {view.camera.name: Path(str(getattr(view, kind))) for view in recording.views if getattr(view, kind) is not None}
-        notes[kind] = {}
-        for name, source in sources.items():
-            if source.is_dir() or source.suffix.lower() in known:
-                link(source, folder / kind / (name if source.is_dir() else name + source.suffix))
-            else:  # a name that only recording.toml can give
-                notes[kind][name] = str(source.resolve())
+    notes |= {kind: _link_views(recording, folder, kind) for kind in ENDINGS if kind not in made}
     for name, source in (("truth", recording.truth), ("training", recording.training)):
         if source is not None:
             link(source, folder / f"{name}{source.suffix}")
@@ -142,6 +136,23 @@ def _write_rest(recording: Recording, folder: Path, calibrated: bool, made: Sequ
         write_calibration(folder / "calibration.toml", [view.camera for view in recording.views])
     if any(notes.values()):
         write_whole(folder / "recording.toml", tomli_w.dumps({key: value for key, value in notes.items() if value}))
+
+
+def _link_views(recording: Recording, folder: Path, kind: str) -> dict[str, Any]:
+    """Link every view's film, empty scene, masks or keypoints; what recording.toml has to say of them."""
+    notes = dict[str, Any]()
+    for view in recording.views:
+        found = getattr(view, kind)
+        if isinstance(found, KeypointSource):
+            notes |= {} if found.model is None else {"model": found.model}
+            found = found.path
+        if found is not None:
+            source, name = Path(str(found)), view.camera.name
+            if source.is_dir() or source.suffix.lower() in ENDINGS[kind]:
+                link(source, folder / kind / (name if source.is_dir() else name + source.suffix))
+            else:  # a name that only recording.toml can give
+                notes[name] = str(source.resolve())
+    return notes
 
 
 def link(source: Path, place: Path) -> None:
