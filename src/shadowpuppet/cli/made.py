@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,9 +45,7 @@ def masks(source: Source = None, /, *, flags: Flags = None) -> None:
     The script is code of others that you choose: it runs with your rights. Its packages are installed into an environment of their own when
     it is first used (by uv if that is there), and kept.
     """
-    from shadowpuppet.io.made.making import make_masks
-
-    _make(("masks",), source, flags or How(), make_masks)
+    _make(("masks",), source, flags or How())
 
 
 def keypoints(source: Source = None, /, *,
@@ -59,16 +55,15 @@ def keypoints(source: Source = None, /, *,
     The script is code of others that you choose: it runs with your rights. Its packages are installed into an environment of their own when
     it is first used (by uv if that is there), and kept.
     """
-    from shadowpuppet.io.made.making import make_keypoints
-
-    _make(("keypoints", "masks") if masks else ("keypoints",), source, flags or How(), partial(make_keypoints, masks=masks))
+    _make(("keypoints", "masks") if masks else ("keypoints",), source, flags or How())
 
 
-def _make(kinds: tuple[str, ...], source: Path | None, how: How, make: Callable[..., list[Made]]) -> None:
+def _make(kinds: tuple[str, ...], source: Path | None, how: How) -> None:
     """Let a script make masks or keypoints, and say how to go on; or list scripts, or write one to start from."""
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.external.script import find_script, shipped_scripts, template
     from shadowpuppet.io.made.made_recording import check_room, readable_recording
+    from shadowpuppet.io.made.making import make
     from shadowpuppet.pipeline.footage import chosen_views
 
     kind = kinds[0]
@@ -82,9 +77,9 @@ def _make(kinds: tuple[str, ...], source: Path | None, how: How, make: Callable[
     recording, calibrated = readable_recording(source, how.calibration)
     recording = replace(recording, views=chosen_views(recording, how.camera))
     folder = how.folder or Path(f"{recording.name}-{kind}")
-    check_room(folder, recording, how.force, kinds)
+    check_room(kinds, folder, recording, how.force)
     with terminal(how.quiet) as listener:
-        made = make(recording, script, folder, listener, listener.note, calibrated=calibrated, replaced=how.force)
+        made = make(kinds, recording, script, folder, listener, calibrated=calibrated, replaced=how.force)
     if not how.quiet:
         show(_table(" and ".join(kinds), script.name, folder, made))
         flags = (*(("--masks",) if "masks" in kinds else ()), *(() if calibrated else ("--fov", "DEGREES")))

@@ -10,7 +10,7 @@ import pytest
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SilhouetteError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
-from shadowpuppet.io.made.made_recording import MADE_BY, link, readable_recording, write_masked_recording
+from shadowpuppet.io.made.made_recording import MADE_BY, link, readable_recording, write_made_recording
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.video import open_frames, write_frames, write_image
 
@@ -43,6 +43,17 @@ def half(view):
     mask = np.zeros((HEIGHT, WIDTH), bool)
     mask[:, : WIDTH // 2] = True
     return [mask] * FRAMES
+
+
+def write_masked_recording(recording, folder, masks, **more):
+    """Write a recording with masks of each view."""
+    def write(part):
+        for view in recording.views:
+            with write_frames(part / "masks" / f"{view.camera.name}.mkv", 10, lossless=True) as writer:
+                for mask in masks(view):
+                    writer.write(255 * mask.astype(np.uint8))
+
+    write_made_recording(("masks",), recording, folder, write, **more)
 
 
 def test_a_recording_keeps_all_that_it_had(two, tmp_path):

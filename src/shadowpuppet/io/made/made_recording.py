@@ -5,20 +5,16 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import RecordingError, reason
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.keypoints.keypoint_files import SUFFIXES, KeypointSource
-from shadowpuppet.io.recording import Recording, View, read_recording
-from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES, FrameWriter, camera_number, open_frames, write_frames
-from shadowpuppet.video.frames import ASSUMED_RATE
+from shadowpuppet.io.recording import Recording, read_recording
+from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES, camera_number
 
 MADE_BY = "made_by.toml"
 """File beside masks or keypoints that says what made them."""
@@ -50,30 +46,7 @@ def readable_recording(source: str | Path, calibration: Path | None = None) -> t
     return found, calibrated
 
 
-def write_masked_recording(recording: Recording, folder: Path, masks: Callable[[View], Iterable[Mask]], *, calibrated: bool = True,
-                           replaced: bool = False, made_by: dict[str, Any] | None = None) -> None:
-    """Write a recording folder as `write_made_recording` does, with masks (H, W) of every frame of each view's film."""
-    def write(part: Path) -> None:
-        for view in recording.views:
-            with mask_film(recording, view, part) as film:
-                for mask in masks(view):
-                    write_mask(film, mask)
-
-    write_made_recording(recording, folder, ("masks",), write, calibrated=calibrated, replaced=replaced, made_by=made_by)
-
-
-def mask_film(recording: Recording, view: View, folder: Path) -> FrameWriter:
-    """A film to be written with the masks of a view's frames, masks/<camera>.mkv in a folder."""
-    rate = open_frames(view.video, rate=recording.rate).rate
-    return write_frames(folder / "masks" / f"{view.camera.name}.mkv", rate if np.isfinite(rate) else ASSUMED_RATE, lossless=True)
-
-
-def write_mask(film: FrameWriter, mask: Mask) -> None:
-    """Write a mask (H, W) into such a film."""
-    film.write(np.multiply(mask, 255, dtype=np.uint8))
-
-
-def write_made_recording(recording: Recording, folder: Path, kinds: Sequence[str], write: Callable[[Path], None], *,
+def write_made_recording(kinds: Sequence[str], recording: Recording, folder: Path, write: Callable[[Path], None], *,
                          calibrated: bool = True, replaced: bool = False, made_by: dict[str, Any] | None = None) -> None:
     """Write a recording folder with a recording's films (linked) and what `write` makes of them, completely or not at all.
 
@@ -84,7 +57,7 @@ def write_made_recording(recording: Recording, folder: Path, kinds: Sequence[str
     """
     import tomli_w
 
-    own = check_room(folder, recording, replaced, kinds)
+    own = check_room(kinds, folder, recording, replaced)
     try:
         folder.absolute().parent.mkdir(parents=True, exist_ok=True)
         part = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder if own else folder.absolute().parent))
@@ -105,7 +78,7 @@ def write_made_recording(recording: Recording, folder: Path, kinds: Sequence[str
         shutil.rmtree(part, ignore_errors=True)
 
 
-def check_room(folder: Path, recording: Recording, replaced: bool, kinds: Sequence[str] = ("masks",)) -> bool:
+def check_room(kinds: Sequence[str], folder: Path, recording: Recording, replaced: bool) -> bool:
     """Whether `folder` is the recording's own. Raises `RecordingError` if something is in the way."""
     if folder.is_dir() and folder.resolve() == recording.path.resolve() and any((folder / name).exists() for name in OF_RECORDINGS):
         there = [kind for kind in kinds if (folder / kind).exists()]

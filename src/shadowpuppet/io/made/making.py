@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Protocol
 
 import numpy as np
 
-from shadowpuppet.camera.mask import Mask
 from shadowpuppet.external.environment import command_for
 from shadowpuppet.external.pipes import FilmScript
 from shadowpuppet.external.script import Script
 from shadowpuppet.io.keypoints.film_keypoints import write_keypoints
-from shadowpuppet.io.made.made_recording import mask_film, write_made_recording, write_mask, write_masked_recording
-from shadowpuppet.io.made.script_keypoints import MASKS, ScriptKeypoints
-from shadowpuppet.io.recording import Recording, View
+from shadowpuppet.io.made.made_recording import write_made_recording
+from shadowpuppet.io.made.script_keypoints import ScriptKeypoints
+from shadowpuppet.io.recording import Recording
 from shadowpuppet.silhouette.external.masks import external_masks
-from shadowpuppet.video import Image, open_frames
-
-Output = TypeVar("Output")
+from shadowpuppet.video import FrameSource, open_frames, write_frames
+from shadowpuppet.video.frames import ASSUMED_RATE
 
 
 class Progress(Protocol):
@@ -36,6 +32,10 @@ class Progress(Protocol):
 
     def advance(self, frames: int) -> None:
         """`frames` frames of the phase are done."""
+        ...
+
+    def note(self, message: str) -> None:
+        """Something that takes minutes begins."""
         ...
 
 
@@ -51,75 +51,42 @@ class Made:
     """Time that they took, with starting the script."""
 
 
-def make_masks(recording: Recording, script: Script, folder: Path, progress: Progress, say: Callable[[str], None] | None = None,
-               *, calibrated: bool = True, replaced: bool = False) -> list[Made]:
-    """Write the recording `folder` with a recording's films and the masks that a script makes of them; see `write_masked_recording`.
+def make(kinds: tuple[str, ...], recording: Recording, script: Script, folder: Path, progress: Progress, *, calibrated: bool = True,
+         replaced: bool = False) -> list[Made]:
+    """Write the recording `folder` with a recording's films and what a script makes of them; see `write_made_recording`.
 
-    say: called before the script's environment is made, which can take minutes; by default a phase of `progress`.
-    Raises `SilhouetteError` if the script cannot run or its masks are wrong, and `RecordingError` if something cannot be written; then
-    nothing is left.
+    kinds: masks; keypoints; or keypoints and masks, which the script makes in one pass. Raises `SilhouetteError` if the script cannot run or
+    its masks are wrong, `FormatError` if its keypoints are, and `RecordingError` if something cannot be written; then nothing is left.
     """
-    films = _Films(recording, script, progress, say)
-
-    def masks(view: View) -> Iterator[Mask]:
-        return films.counted("masks", view, partial(external_masks, films.script_on(view)), np.any)
-
-    write_masked_recording(recording, folder, masks, calibrated=calibrated, replaced=replaced, made_by=films.made_by)
-    return films.made
-
-
-def make_keypoints(recording: Recording, script: Script, folder: Path, progress: Progress, say: Callable[[str], None] | None = None,
-                   *, masks: bool = False, calibrated: bool = True, replaced: bool = False) -> list[Made]:
-    """Write the recording `folder` with a recording's films and the keypoints that a script makes of them, keypoints/<camera>.npz, and the
-    masks too if it is asked for both, as `make_masks` does. Raises `FormatError` for what are no keypoints."""
-    films = _Films(recording, script, progress, say, (MASKS,) if masks else ())
+    command, made = command_for(script, progress.note), list[Made]()
 
     def write(part: Path) -> None:
         for view in recording.views:
-            with ExitStack() as stack:
-                film = stack.enter_context(mask_film(recording, view, part)) if masks else None
-                found = ScriptKeypoints(films.script_on(view))
-                for _, mask in films.counted("keypoints", view, found.made, lambda made: made[0]):
-                    if film is not None and mask is not None:
-                        write_mask(film, mask)
-            write_keypoints(part / "keypoints" / f"{view.camera.name}.npz", found.film())
+            source = open_frames(view.video, rate=recording.rate)
+            made.append(Made(view.camera.name))
+            progress.begin(f"{kinds[0]} of {view.camera.name}", source.count)
+            _make_of_film(kinds, FilmScript(command, script.name, Path(str(view.video)), source.size, kinds[1:]), source, part, made[-1],
+                          progress)  # fmt: skip
 
-    write_made_recording(recording, folder, ("keypoints", *films.options), write, calibrated=calibrated, replaced=replaced,
-                         made_by=films.made_by)
-    return films.made
+    made_by = {"script": script.name, "sha256": hashlib.sha256(script.path.read_bytes()).hexdigest(),
+               "requirements": list(script.requirements), "requires_python": script.pythons, "film": str(recording.path)}
+    write_made_recording(kinds, recording, folder, write, calibrated=calibrated, replaced=replaced, made_by=made_by)
+    return made
 
 
-class _Films:
-    """A script run on each film of a recording; `made`: what it made of them so far."""
-
-    def __init__(self, recording: Recording, script: Script, progress: Progress, say: Callable[[str], None] | None,
-                 options: tuple[str, ...] = ()) -> None:
-        """The script's environment is made if there is none yet."""
-        self.recording, self.script, self.progress, self.options = recording, script, progress, options
-        self.command = command_for(script, say or progress.begin)
-        self.made = list[Made]()
-
-    def script_on(self, view: View) -> FilmScript:
-        """The script, to be run on a view's film."""
-        size = open_frames(view.video, rate=self.recording.rate).size
-        return FilmScript(self.command, self.script.name, Path(str(view.video)), size, self.options)
-
-    def counted(self, what: str, view: View, outputs: Callable[[Iterable[Image]], Iterator[Output]],
-                is_found: Callable[[Output], object]) -> Iterator[Output]:
-        """What the script makes of a view's frames, counted while it is made. is_found: whether a person is in one."""
-        source = open_frames(view.video, rate=self.recording.rate)
-        one = Made(view.camera.name)
-        self.made.append(one)
-        self.progress.begin(f"{what} of {one.camera}", source.count)
-        begun = time.perf_counter()
-        for output in outputs(frame.image for frame in source):
-            yield output
-            one.frames, one.empty = one.frames + 1, one.empty + (not is_found(output))
-            one.seconds = time.perf_counter() - begun
-            self.progress.advance(one.frames)
-
-    @property
-    def made_by(self) -> dict[str, Any]:
-        """What makes it, for made_by.toml."""
-        return {"script": self.script.name, "sha256": hashlib.sha256(self.script.path.read_bytes()).hexdigest(),
-                "requirements": list(self.script.requirements), "requires_python": self.script.pythons, "film": str(self.recording.path)}
+def _make_of_film(kinds: tuple[str, ...], script: FilmScript, source: FrameSource, folder: Path, made: Made, progress: Progress) -> None:
+    """Write what a script makes of one film into the kinds' folders, and count it."""
+    begun, images = time.perf_counter(), (frame.image for frame in source)
+    keypoints = ScriptKeypoints(script) if "keypoints" in kinds else None
+    outputs = keypoints.made(images) if keypoints else ((bool(mask.any()), mask) for mask in external_masks(script, images))
+    rate = source.rate if np.isfinite(source.rate) else ASSUMED_RATE
+    film = write_frames(folder / "masks" / f"{made.camera}.mkv", rate, lossless=True) if "masks" in kinds else None
+    with closing(outputs), film or nullcontext():
+        for is_person, mask in outputs:
+            if film is not None and mask is not None:
+                film.write(np.multiply(mask, 255, dtype=np.uint8))
+            made.frames, made.empty = made.frames + 1, made.empty + (not is_person)
+            made.seconds = time.perf_counter() - begun
+            progress.advance(made.frames)
+    if keypoints:
+        write_keypoints(folder / "keypoints" / f"{made.camera}.npz", keypoints.film())

@@ -20,9 +20,6 @@ from shadowpuppet.io.keypoints.script_output import Header, header_of, people_of
 from shadowpuppet.silhouette.external.masks import checked_mask
 from shadowpuppet.video import Image
 
-MASKS = "masks"
-"""Argument by which a script is asked for masks too."""
-
 
 class ScriptKeypoints:
     """Keypoints that a script makes of one film."""
@@ -62,7 +59,7 @@ class ScriptKeypoints:
         if not self.script.options or not line:
             return line, "" if line.endswith((b"\n", b"}")) else f"found a line that ends after {len(line)} bytes"
         mask = pipe.read(size := self.script.size[0] * self.script.size[1])
-        fault = f"found {len(mask)} bytes after its line, expected its mask of {size}, as the script was started with the argument {MASKS}"
+        fault = f"found {len(mask)} bytes after its line, expected its mask of {size}, as the script was started with the argument masks"
         return line + mask, "" if len(mask) == size else fault
 
     def _line(self, pipe: IO[bytes]) -> bytes:
