@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from shadowpuppet.io.keypoints.film_keypoints import read_npz
 from shadowpuppet.video import open_frames
 
 DARK = '''# /// script
@@ -73,3 +74,7 @@ def test_mediapipe_finds_nobody_in_grey_pictures(shell, two, home, monkeypatch):
     done = shell("masks", two, "-o", home / "new", "--quiet")
     assert done.code == 0, done.err
     assert not max(frame.image.max() for frame in open_frames(home / "new" / "masks" / "left.mkv", grey=True))
+    done = shell("keypoints", two, "--masks", "-o", home / "both", "--quiet")
+    assert done.code == 0, done.err
+    assert not len(read_npz(home / "both" / "keypoints" / "left.npz", (32, 24)).frame)
+    assert not max(frame.image.max() for frame in open_frames(home / "both" / "masks" / "left.mkv", grey=True))

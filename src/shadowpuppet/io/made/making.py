@@ -55,8 +55,8 @@ def make(kinds: tuple[str, ...], recording: Recording, script: Script, folder: P
          replaced: bool = False) -> list[Made]:
     """Write the recording `folder` with a recording's films and what a script makes of them; see `write_made_recording`.
 
-    kinds: masks; keypoints; or keypoints and masks, which the script makes in one pass. Raises `SilhouetteError` if the script cannot run or
-    its masks are wrong, `FormatError` if its keypoints are, and `RecordingError` if something cannot be written; then nothing is left.
+    kinds: masks; keypoints; or keypoints and masks, which the script makes in one pass. Raises `SilhouetteError` if the script cannot run
+    or its masks are wrong, `FormatError` if its keypoints are, and `RecordingError` if something cannot be written; then nothing is left.
     """
     command, made = command_for(script, progress.note), list[Made]()
 
