@@ -65,8 +65,8 @@ def make(kinds: tuple[str, ...], recording: Recording, script: Script, folder: P
             source = open_frames(view.video, rate=recording.rate)
             made.append(Made(view.camera.name))
             progress.begin(f"{kinds[0]} of {view.camera.name}", source.count)
-            _make_of_film(kinds, FilmScript(command, script.name, Path(str(view.video)), source.size, kinds[1:]), source, part, made[-1],
-                          progress)  # fmt: skip
+            run = FilmScript(command, script.name, Path(str(view.video)), source.size, kinds[1:])
+            _make_of_film(kinds, run, source, part, made[-1], progress)
 
     made_by = {"script": script.name, "sha256": hashlib.sha256(script.path.read_bytes()).hexdigest(),
                "requirements": list(script.requirements), "requires_python": script.pythons, "film": str(recording.path)}
