@@ -162,6 +162,11 @@ def test_shares_of_the_picture_are_no_pixels(tmp_path):
     assert refusal(folder) == "points: found none beyond 1, expected pixels, no shares of the picture"
 
 
+def test_points_that_are_all_outside_the_picture_are_another_films(tmp_path):
+    path = write(tmp_path / "a.json", [{"image_id": "0.jpg", "keypoints": [900, 600, 0.9] * 17}])
+    assert refusal(path) == "points: found all outside the picture of 640 x 480 pixels, expected those of its film"
+
+
 @pytest.mark.parametrize(("names", "words"), [
     ((), "found no files of JSON in it"), (("a_7", "b_07"), "found frame 7 in it and in a_7.json, expected every frame once"),
     (("a",), "frame: found no number in 'a'"), (("1" * 30,), "frame: found no number in "), (("9999999999",), "frame: found 9999999999,"),
