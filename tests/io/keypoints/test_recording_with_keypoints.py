@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import unicodedata
 
 import numpy as np
@@ -102,6 +103,12 @@ def test_a_project_of_pose2sim_has_its_keypoints_where_it_writes_them(pose2sim):
     found = of_cameras(pose2sim)
     assert {name: source.path for name, source in found.items()} == {name: pose2sim / "pose" / f"{name}_json" for name in ("a", "b")}
     assert found["a"].model is None
+
+
+def test_a_file_in_its_place_is_no_folder_of_keypoints(pose2sim):
+    shutil.rmtree(pose2sim / "pose" / "a_json")
+    (pose2sim / "pose" / "a_json").write_text("")
+    assert of_cameras(pose2sim)["a"] is None
 
 
 @pytest.mark.parametrize("level", [0, 1, 2])
