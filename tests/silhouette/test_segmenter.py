@@ -17,7 +17,6 @@ from silhouette_scenes import CLEANED, METHODS, SIZE, dressed, empty_shots, figu
 from shadowpuppet.errors import SettingsError, SilhouetteError
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background, ready_mask, recover_scene
 from shadowpuppet.silhouette._kernels import part_sizes, some_parts
-from shadowpuppet.silhouette.background import to_planes
 from shadowpuppet.silhouette.boundary import SHARP_WIDTH, EdgeProfile
 from shadowpuppet.silhouette.channels import wardrobe_share
 from shadowpuppet.silhouette.classifiers import ChannelClassifier
@@ -231,17 +230,6 @@ def test_films_without_colour_are_keyed_by_brightness(rng, channels):
     for method in ("colour", "both"):
         with pytest.raises(SettingsError, match=f"found {method} for a film without colour, expected one of auto, averaging"):
             learn_background(images, SilhouetteSettings(method=method))
-
-
-def test_colour_that_is_mere_noise_is_left_alone(rng):
-    noisy = []
-    for image in empty_shots(rng, scene(rng, (70, 70, 70))):
-        planes = to_planes(image)
-        planes[..., 1:] = np.clip(128 + rng.normal(0, 60, (*SIZE, 2)), 0, 255)
-        noisy.append(np.asarray(cv2.cvtColor(planes, cv2.COLOR_YCrCb2BGR), np.uint8))
-    segmenter = learn_background(noisy)
-    assert segmenter.key == "brightness"
-    assert "adds nothing" in segmenter.reason
 
 
 def test_the_wardrobe_is_of_true_colours(rng):

@@ -19,9 +19,6 @@ SMOOTHING = 0.7
 NOISY, NOISY_SMOOTHING = 3.0, 1.5
 """Noise of a film after that, grey levels of brightness, from which on it is smoothed by more; a camera in good light and web video have
 less."""
-WHITE_SHARE = 0.7
-"""Share of the noise that this smoothing leaves, below which it is a sensor's: independent from pixel to pixel. Compression's is not."""
-
 EXACT = 256
 """Number of pictures whose squares' sum a float32 holds exactly: accumulating takes half the time of float64."""
 UNLIKE = 8.0
@@ -163,16 +160,6 @@ class FilmNoise(NamedTuple):
     """The same (3,) over that after the least smoothing."""
     least: NDArray[np.float64]
     """The same (3,) after the least smoothing."""
-
-    @property
-    def noisy(self) -> bool:
-        """Whether the film is smoothed by more than a clean one."""
-        return self.smoothing > SMOOTHING
-
-    @property
-    def grainy(self) -> bool:
-        """Whether that noise is a sensor's, so that averages over areas have little of it."""
-        return self.noisy and bool(self.share[0] < WHITE_SHARE)
 
 
 def measured_noise(frames: list[Image], mean: Floats) -> FilmNoise:

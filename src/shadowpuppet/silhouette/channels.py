@@ -1,4 +1,4 @@
-"""Choice of the key (brightness, colour or both) that separates a person best from a background."""
+"""Choice of the key, colour alone or brightness too, that separates a person best from a background."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.silhouette.background import to_planes
-from shadowpuppet.silhouette.classifiers import CERTAIN_FACTOR, KEY_CHANNELS, ChannelClassifier
+from shadowpuppet.silhouette.classifiers import CERTAIN_FACTOR, ChannelClassifier
 
 WARDROBE = (
     (20, 20, 22), (55, 55, 58), (120, 120, 122), (185, 185, 185), (230, 230, 228), (30, 35, 65), (55, 80, 150), (130, 165, 205),
@@ -20,8 +20,6 @@ CLEAR_FACTOR = 2.0
 """Factor on the threshold of sure pixels from which on a colour differs clearly: light and shading take some of it away."""
 COLOUR_ALONE_SHARE = 0.9
 """Share of clothes and skin from which on colour alone is the key, as light and shadow change brightness first."""
-MIN_COLOUR_GAIN = 0.01
-"""Gain in that share below which colour only adds noise."""
 
 
 class KeyChoice(NamedTuple):
@@ -32,20 +30,13 @@ class KeyChoice(NamedTuple):
 
 
 def choose_key(classifier: ChannelClassifier) -> KeyChoice:
-    """The key by which most ordinary clothes and skin differ clearly from a classifier's background, whatever its own key.
-
-    `both` always distinguishes most; a single one is taken if it does nearly as well.
-    """
-    share = {key: wardrobe_share(replace(classifier, key=key)) for key in KEY_CHANNELS}
-    brightness, colour, both = (f"{100 * share[key]:.0f} %" for key in ("brightness", "colour", "both"))
-    verdict = "of ordinary clothes and skin differ clearly from this background"
-    if share["both"] - share["brightness"] < MIN_COLOUR_GAIN:
-        return KeyChoice("brightness", f"brightness: {brightness} {verdict} in brightness, and colour adds nothing")
-    if share["colour"] >= COLOUR_ALONE_SHARE:
-        return KeyChoice("colour", f"colour: {colour} {verdict} in colour alone ({brightness} in brightness), "
-                                "and light and shadow change colour least")
-    return KeyChoice("both", f"both: {both} {verdict} in brightness and colour together, {brightness} in brightness alone, "
-                          f"{colour} in colour alone")
+    """Colour alone where most ordinary clothes and skin differ clearly from a classifier's background by it, as from a blue wall; else
+    brightness and colour together."""
+    share = wardrobe_share(replace(classifier, key="colour"))
+    verdict = f"{100 * share:.0f} % of ordinary clothes and skin differ clearly from this background in colour"
+    if share >= COLOUR_ALONE_SHARE:
+        return KeyChoice("colour", f"colour: {verdict}, and light and shadow change colour least")
+    return KeyChoice("both", f"both: brightness and colour, as only {verdict}")
 
 
 def wardrobe_share(classifier: ChannelClassifier) -> float:

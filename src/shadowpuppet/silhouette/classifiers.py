@@ -27,7 +27,6 @@ from shadowpuppet.silhouette.background import (
 from shadowpuppet.silhouette.boundary import Labels, disc
 
 if TYPE_CHECKING:
-    from shadowpuppet.silhouette.areas import AreaFilter
     from shadowpuppet.silhouette.settings import SilhouetteSettings
 
 KEY_CHANNELS = {"brightness": (1, 0, 0), "colour": (0, 1, 1), "both": (1, 1, 1)}
@@ -47,17 +46,6 @@ Classifier = Callable[[Image], Labels]
 """From a frame (H, W, 3) or (H, W) to its labels (H, W)."""
 
 
-class AreaColours(NamedTuple):
-    """What colours averaged over areas are compared with."""
-
-    average: AreaFilter
-    """Averages a frame's colours."""
-    mean: Floats
-    """Background, averaged alike, Y, Cr, Cb, of shape (H, W, 3)."""
-    inverse_sigma: Floats
-    """Inverse of the assumed standard deviation, of shape (H, W, 3)."""
-
-
 @dataclass(frozen=True, eq=False)
 class ChannelClassifier:
     """Classifier by the difference from the background: foreground pixels differ by `factor` standard deviations over the key's channels
@@ -73,8 +61,6 @@ class ChannelClassifier:
     """Least share of its brightness that the background keeps in shadow; 1: no pixel counts as shadow."""
     smoothing: float = SMOOTHING
     """Standard deviation of the smoothing of frames, pixels."""
-    areas: AreaColours | None = None
-    """Colours averaged over areas, which are compared too; None unless the film is noisy."""
 
     def __call__(self, image: Image) -> Labels:
         """Labels (H, W) of a picture (H, W, 3) or (H, W)."""
@@ -83,26 +69,16 @@ class ChannelClassifier:
     def with_shadows(self, image: Image) -> tuple[Labels, NDArray[np.bool_] | None]:
         """Labels (H, W) of a picture (H, W, 3) or (H, W), and the background pixels (H, W) that a dark limb might look like; None if no
         pixel counts as shadow."""
-        from shadowpuppet.silhouette.areas import with_areas
         from shadowpuppet.silhouette.shadows import MAX_SHADE, MAYBE_SHADOW, resolve_shadows
 
-        planes = to_planes(image)
         resolved = self.darkest < 1 and SHADOW_CHANNELS[self.key][0] > 0
-        asked, smooth = MAX_SHADE if resolved else 0.0, smoothed(planes, self.smoothing)
-        label = self.labels(smooth, asked)
-        if self.areas is not None:
-            label = with_areas(label, self.by_area.labels(self.areas.average(planes), asked))
+        smooth = smoothed(to_planes(image), self.smoothing)
+        label = self.labels(smooth, MAX_SHADE if resolved else 0.0)
         if not resolved:
             return label, None
         either = label == MAYBE_SHADOW
         label = resolve_shadows(label, smooth, self.mean, self.inverse_sigma)
         return label, either & (label == 0)
-
-    @cached_property
-    def by_area(self) -> ChannelClassifier:
-        """The classifier of colours averaged over areas; itself without them."""
-        areas = self.areas
-        return self if areas is None else replace(self, mean=areas.mean, inverse_sigma=areas.inverse_sigma, areas=None)
 
     def labels(self, planes: Image, asked: float = 0.0) -> Labels:
         """Labels (H, W) of smoothed Y, Cr, Cb (H, W, 3), pixel by pixel.

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from shadowpuppet.camera.mask import Window, bounding_window
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.silhouette import background as scene
-from shadowpuppet.silhouette.areas import AreaFilter
 from shadowpuppet.silhouette.background import Background, FilmNoise, Floats, Image
 from shadowpuppet.silhouette.boundary import SHARP_WIDTH, Contrast, EdgeProfile, Labels, outline_width
 from shadowpuppet.silhouette.channels import KeyChoice, choose_key
-from shadowpuppet.silhouette.classifiers import METHODS, AreaColours, ChannelClassifier, EmptyScene, edge_jitter
+from shadowpuppet.silhouette.classifiers import METHODS, ChannelClassifier, EmptyScene, edge_jitter
 from shadowpuppet.silhouette.cleanup import coarse_person
 from shadowpuppet.silhouette.correction.detail import lost_detail
 from shadowpuppet.silhouette.correction.frame_correction import Correction
@@ -82,24 +81,12 @@ def _channel_classifier(background: Background, frames: list[Image], settings: S
         noise = noise._replace(sigma=_noise_of(plain, background, noise.smoothing))
     mean = scene.smoothed(background.mean, noise.smoothing)
     sigma = assumed_sigma(background, noise, settings.noise_floor, mean)
-    areas = _area_colours(background, frames, noise, settings) if noise.grainy and background.colour else None
-    return ChannelClassifier("both", mean, (1 / sigma).astype(np.float32), settings.factor, darkest, noise.smoothing,
-                             areas)
+    return ChannelClassifier("both", mean, (1 / sigma).astype(np.float32), settings.factor, darkest, noise.smoothing)
 
 
 def _noise_of(frames: list[Image], background: Background, smoothing: float) -> NDArray[np.float64]:
     """Noise (3,) of frames after a smoothing (pixels)."""
     return scene.film_noise(frames, scene.smoothed(background.mean, smoothing), partial(scene.smoothed, smoothing=smoothing))
-
-
-def _area_colours(background: Background, frames: list[Image], noise: FilmNoise, settings: SilhouetteSettings) -> AreaColours:
-    """Colours averaged over areas, for a film with the `noise` of a sensor."""
-    average = AreaFilter(noise.smoothing, float(noise.sigma[0]))
-    mean = average(background.mean)
-    sigma = scene.film_noise(frames, mean, average)
-    least = noise.sigma / np.maximum(noise.share, 1e-3)
-    averaged = FilmNoise(noise.smoothing, sigma, np.minimum(sigma / np.maximum(least, 1e-3), 1), least)
-    return AreaColours(average, mean, (1 / assumed_sigma(background, averaged, settings.noise_floor, mean)).astype(np.float32))
 
 
 def assumed_sigma(background: Background, noise: FilmNoise, noise_floor: float, mean: Floats) -> np.ndarray:

@@ -21,8 +21,8 @@ class SilhouetteSettings:
 
     method: Method = "auto"
     """Segmentation method. `brightness`, `colour` (Cr and Cb) and `both` name the channels that are compared with the background; `auto`
-    chooses the one of these three that suits the background. `averaging` is eq. 1; `mog2`, a mixture of Gaussians, is frozen
-    after learning."""
+    is `both`, `colour` before a coloured wall, or `brightness` of a film without colour. `averaging` is eq. 1; `mog2`, a mixture of
+    Gaussians, is frozen after learning."""
     factor: Annotated[float, Field(gt=0, le=100)] = 2.0
     """Least difference of a foreground pixel from the background, standard deviations (eq. 1). With brightness, colour and both it must
     also be connected to pixels that differ by twice as much; mog2 has thresholds of its own."""
