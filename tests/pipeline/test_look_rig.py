@@ -31,6 +31,7 @@ from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.track import track_recording
 
+pytestmark = pytest.mark.usefixtures("scale_unfitted")
 MASKS = Options(masks=True)
 
 

@@ -19,6 +19,7 @@ from shadowpuppet.pipeline.rig import FrameSet, open_rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
 from shadowpuppet.pipeline.track import Listener, run, track_recording
 
+pytestmark = pytest.mark.usefixtures("scale_unfitted")
 QUICK = {"tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import made_rig
 import noises
 import numpy as np
@@ -16,6 +18,7 @@ from shadowpuppet.pipeline.repair.films import check_films
 from shadowpuppet.pipeline.repair.fix import fix_recording
 from shadowpuppet.pipeline.rig import open_rig
 
+pytestmark = pytest.mark.usefixtures("scale_unfitted")
 MASKS = Options(masks=True)
 RATE = 16000
 LATE = (0, 8, 0, -3)
@@ -23,12 +26,17 @@ LATE = (0, 8, 0, -3)
 SECONDS = 6.0
 
 
+@cache
+def seen(n):
+    """Silhouettes of frame `n`."""
+    return made_rig.masks(made_rig.cameras(), 1, n)[0]
+
+
 def films(folder, frames_of, late):
     """A recording of 60 frames; camera k shows frame `frames_of(n, k)` as its n-th, and is heard `late[k]` frames late; silent if None."""
     cameras = made_rig.cameras()
     count = round(SECONDS * made_rig.RATE)
-    every = made_rig.masks(cameras, count + 32)
-    path = made_rig.write(folder, cameras, [[every[frames_of(n, k)][k] for k in range(len(cameras))] for n in range(count)])
+    path = made_rig.write(folder, cameras, [[seen(frames_of(n, k))[k] for k in range(len(cameras))] for n in range(count)])
     if late is None:
         return path
     rng = np.random.default_rng(3)
