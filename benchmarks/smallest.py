@@ -59,7 +59,8 @@ def track(folder: Path, spec: Spec = ONE) -> tuple[Path, Path]:
     recording, run = make(folder / spec.name, spec), folder / f"{spec.name}_run"
     if KEPT in os.environ:
         return recording, shutil.copytree(Path(os.environ[KEPT], run.name), run)
-    track_recording(recording, run, make_options({"preset": "liu2011", "masks": True} if spec is ONE else {"masks": True, "multiview": FEW}))
+    chosen = {"preset": "liu2011"} if spec is ONE else {"multiview": FEW}
+    track_recording(recording, run, make_options({"masks": True, **chosen}))
     return recording, run
 
 
