@@ -196,6 +196,7 @@ def test_sizes_of_an_earlier_run_are_used_again(untaught, run, shell):
     assert errors(again).mean() < 0.04
 
 
+@pytest.mark.whole
 def test_without_training_sizes_come_from_the_height_or_from_what_is_seen(untaught, shell, monkeypatch):
     monkeypatch.setattr(person_rig, "AVERAGE_HEIGHT", 1.0)  # which is for those of whom nothing is seen
     found = tracked(shell, untaught, "--height", 1.75)
@@ -218,6 +219,7 @@ def test_the_paper_s_preset_runs(recording, shell):
     assert tomllib.loads(Path("run/person.toml").read_text())["body"] == "cylinders"
 
 
+@pytest.mark.whole
 def test_a_prior_is_learnt_once_and_taken_from_its_file(recording, untaught, shell):
     assert shell("fit-prior", recording / "training.csv", "-o", "walk.npz", "--regions", 6, "--rate", 20)[0] == 0
     assert errors(tracked(shell, untaught, "--prior", "walk.npz", "--height", 1.75)).mean() < 0.06

@@ -134,6 +134,7 @@ def test_a_full_store_holds_nothing():
     assert store.size > store.limit
 
 
+@pytest.mark.whole
 def test_several_cameras_share_silhouettes_between_seeds(rig_recording, tmp_path, monkeypatch):
     cache = SilhouetteCache()
     kind = MULTIVIEW._replace(fit=lambda rng, survey, options: followed(survey.rig.cameras))

@@ -69,6 +69,7 @@ def test_a_still_person_s_films_are_put_in_step_by_what_is_heard(still):
     assert (again.by_clock, again.late, again.good) == (False, (), True)
 
 
+@pytest.mark.whole
 def test_sound_that_lags_behind_its_pictures_is_doubted_and_changes_nothing(tmp_path):
     path = films(tmp_path / "lag", lambda n, k: n + 12, LATE)  # the pictures are in step
     rig = open_rig(path, MASKS)
@@ -88,6 +89,7 @@ def test_sound_and_silhouettes_that_agree_are_both_stated(tmp_path):
     assert not any("sound and silhouettes" in doubt for doubt in found.doubts)
 
 
+@pytest.mark.whole
 def test_films_that_are_far_from_in_step_are_found_by_sound_first(tmp_path):
     late, heard = (0, 32, 0, 0), (0, 30, 0, 0)  # more than silhouettes are searched for; of what is left they know better
     path = films(tmp_path / "far", lambda n, k: n + 32 - late[k], heard)
