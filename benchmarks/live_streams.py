@@ -33,7 +33,7 @@ from shadowpuppet.live.display.view import Display, SessionState
 from shadowpuppet.live.run import run_live
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.stream.outlet import Outlet, Outlets, StreamFrame, StreamSubject
-from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.video import Size, open_frames
 
 EMPTY = 3.0
@@ -196,7 +196,7 @@ def session(stage: Stage, faults: Faults, seconds: float, truth: JointTable) -> 
         with tempfile.TemporaryDirectory() as folder:
             calibration = Path(folder) / "calibration.toml"
             write_calibration(calibration, cameras)
-            metrics = run_live(Path(folder) / "run", Options(calibration=calibration, seed=1), settings, display=timer,
+            metrics = run_live(Path(folder) / "run", make_options({"calibration": calibration, "seed": 1}), settings, display=timer,
                                outlets=Outlets([receiver]))
     finally:
         cameraman.kill()

@@ -87,8 +87,9 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=6.0, help="of walking; the board is carried for five times as long")
     parser.add_argument("--rate", type=float, default=15.0, help="frames/s of the board's films")
     parser.add_argument("--square", type=float, default=0.16, help="metres: 16 pixels for pictures 640 wide, as the manual asks for")
+    parser.add_argument("--every", type=int, default=1, help="track every so many frames")
     parser.add_argument("--no-boards", action="store_true", help="take the true cameras, as they stood in the session, for calibrated ones")
-    args = parse(parser, lambda folder: [folder, "--cameras", 3, "--size", 160, 120, "--seconds", 2, "--no-boards"])
+    args = parse(parser, lambda folder: [folder, "--cameras", 3, "--size", 160, 120, "--seconds", 2, "--every", 5, "--no-boards"])
     folder, size = args.folder, tuple(args.size)
     if not (folder / "lab").exists():
         film(folder, args.cameras, size, args.seconds)
@@ -109,7 +110,7 @@ def main() -> None:
     print("the same after check --fix, as it stands now")
     for row in errors(true, list(read_calibration(folder / "lab" / "calibration.toml"))):
         print("  ".join(row))
-    found, best = (joint_errors(folder, name, ["--quiet"]) for name in ("lab", "true"))
+    found, best = (joint_errors(folder, name, ["--quiet", "--every", str(args.every)]) for name in ("lab", "true"))
     print(f"{time.process_time() - clock:.0f} s of processor time")
     ratio = found[0] / best[0]
     print(f"joints: mean {found[0]:.1f} mm, rms {found[1]:.1f}; with the true calibration {best[0]:.1f} and {best[1]:.1f}: "

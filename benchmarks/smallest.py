@@ -1,8 +1,11 @@
-"""The flag `--smallest` of every script here: its whole way in some seconds, on made data. CI runs it (tests/test_benchmarks.py)."""
+"""The flag `--smallest` of every script here: its whole way in some seconds, on made data, with few particles. CI runs it
+(tests/test_benchmarks.py)."""
 
 from __future__ import annotations
 
 import argparse
+import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -11,11 +14,18 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.synthetic import Gesture, Ring, Scene, Spec, Viewpoint, synthesize
+from shadowpuppet.tracking.multiview.settings import MULTIVIEW_PRESETS
 
 ONE = Spec(name="tiny", motion=(Gesture(motion="wave_hands", seconds=2),), cameras=(Viewpoint(size=(160, 120)),), rate=8,
            scene=Scene(empty_seconds=1))  # fmt: skip
 RING = Spec(name="tiny_ring", motion=(Gesture(motion="walk", seconds=2.5),), rate=10, scene=Scene(empty_seconds=1),
             ring=Ring(count=4, radius=3.6, fov_deg=42, size=(160, 120)))  # fmt: skip
+
+FEW = {"particles": 4, "cycles": 1, "hull": {"rays": 300}}
+if "--smallest" in sys.argv:  # also in the processes that a script starts
+    MULTIVIEW_PRESETS["default"].update(FEW)
+KEPT = "SMALLEST_KEPT"
+"""Environment variable: a folder in which tiny recordings and runs (`keep`) lie, to be copied in place of made."""
 
 
 def parse(parser: argparse.ArgumentParser, smallest: Callable[[Path], Sequence[object]]) -> argparse.Namespace:
@@ -34,6 +44,8 @@ def parse(parser: argparse.ArgumentParser, smallest: Callable[[Path], Sequence[o
 
 def make(folder: Path, spec: Spec = ONE) -> Path:
     """A tiny recording, or a ring's (`RING`), in `folder`; marked as the proving grounds' are, so that it is taken for one of theirs."""
+    if KEPT in os.environ:
+        return shutil.copytree(Path(os.environ[KEPT], spec.name), folder)
     synthesize(spec, folder, np.random.default_rng(7))
     (folder / "made").touch()
     return folder
@@ -44,9 +56,18 @@ def track(folder: Path, spec: Spec = ONE) -> tuple[Path, Path]:
     from shadowpuppet.pipeline.options import make_options
     from shadowpuppet.pipeline.track import track_recording
 
-    recording, run = make(folder / "recording", spec), folder / "run"
-    track_recording(recording, run, make_options({"preset": "liu2011", "masks": True} if spec is ONE else {"masks": True}))
+    recording, run = make(folder / spec.name, spec), folder / f"{spec.name}_run"
+    if KEPT in os.environ:
+        return recording, shutil.copytree(Path(os.environ[KEPT], run.name), run)
+    chosen = {"preset": "liu2011"} if spec is ONE else {"multiview": FEW}
+    track_recording(recording, run, make_options({"masks": True, **chosen}))
     return recording, run
+
+
+def keep(folder: Path) -> None:
+    """Make what scripts that are given the folder by `KEPT` copy."""
+    track(folder, ONE)
+    track(folder, RING)
 
 
 def copy(page: Path, folder: Path) -> Path:

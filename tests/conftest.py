@@ -86,6 +86,12 @@ def cameras() -> list[Camera]:
     return made_rig.cameras()
 
 
+@pytest.fixture
+def scale_unfitted(monkeypatch) -> None:
+    """A look at several cameras fits no bodies to tell a wrong scale, most of its time: tests/pipeline/findings/test_scale.py has that."""
+    monkeypatch.setattr("shadowpuppet.pipeline.findings.scale.fitted_heights", lambda *given: iter(()))
+
+
 class Said(NamedTuple):
     """Exit code and output of a command."""
 

@@ -21,13 +21,20 @@ def changed(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts}
 
 
+@pytest.fixture
+def kept(once, monkeypatch) -> Path:
+    """What scripts make alike: tiny recordings and runs of them."""
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    return once("smallest", importlib.import_module("smallest").keep)
+
+
 @pytest.mark.whole
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
-def test_a_benchmark_runs_in_its_smallest_form(script, tmp_path):
+def test_a_benchmark_runs_in_its_smallest_form(script, kept, tmp_path):
     before = changed(ROOT / "docs"), changed(ROOT / "benchmarks")
     path = os.pathsep.join([str(ROOT / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
-    done = subprocess.run([sys.executable, script, "--smallest", tmp_path / "out"], cwd=tmp_path, env=os.environ | {"PYTHONPATH": path},
-                          capture_output=True, text=True)
+    done = subprocess.run([sys.executable, script, "--smallest", tmp_path / "out"], cwd=tmp_path,
+                          env=os.environ | {"PYTHONPATH": path, "SMALLEST_KEPT": str(kept)}, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-3000:]
     if done.stdout.startswith("skipped: "):
         pytest.skip(done.stdout.strip())

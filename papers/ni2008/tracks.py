@@ -9,9 +9,11 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from copy import deepcopy
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -101,7 +103,7 @@ class Track(NamedTuple):
     poses: Array
     """The estimates, of shape (T, D)."""
     seconds: Array
-    """Of the processor for each frame, of shape (T,); silhouettes and surface points are not in them."""
+    """Of the processor for each frame, of shape (T,); silhouettes, surface points and the search are not in them."""
     overlap: Array
     """Of the drawn body and the silhouettes, of shape (T,)."""
 
@@ -162,13 +164,12 @@ def follow(case: Case, way: Way, seed: int) -> Track:
     settings = make_multiview_settings("ni2008", way.settings)
     prior = learn(case, way.regions, seed).prior if settings.method == "hybrid" else None
     tracker = MultiviewTracker(case.body, case.cameras, settings, prior, case.training)
-    searching = replace(tracker, settings=make_multiview_settings("ni2008"), prior=None)  # all methods begin alike
-    rng, state, poses, seconds, overlap = np.random.default_rng([seed, 1]), None, [], [], []
+    rng, state, poses, seconds, overlap = *begun(case, seed), [], [], []
     for frame in range(case.frames):
         points, masks = case.points(frame), case.masks(frame)
         start = time.process_time()
-        if state is None:
-            state = disturbed(rng, tracker, searching.start(rng, points, masks))
+        if frame == 0:
+            state = disturbed(rng, tracker, state)
         elif len(points.points):
             state = placed(state, case.true_poses[frame]) if way.from_truth else state
             state = tracker.cycle(rng, state, MultiviewObservation(tracker.views, points, masks))
@@ -176,6 +177,21 @@ def follow(case: Case, way: Way, seed: int) -> Track:
         poses.append(state.pose)
         overlap.append(state.overlap)
     return Track(np.array(poses), np.array(seconds), np.array(overlap))
+
+
+def begun(case: Case, seed: int) -> tuple[np.random.Generator, MultiviewState]:
+    """The state that the search finds in the first frame, the same for all methods, and the random numbers that follow it. The search takes
+    as long as ten frames: a case keeps what it found, by seed."""
+    kept = BEGUN.setdefault(case, {})
+    if seed not in kept:
+        rng = np.random.default_rng([seed, 1])
+        tracker = MultiviewTracker(case.body, case.cameras, make_multiview_settings("ni2008"), None, case.training)
+        kept[seed] = rng, tracker.start(rng, case.points(0), case.masks(0))
+    return deepcopy(kept[seed])
+
+
+BEGUN = WeakKeyDictionary[Case, dict[int, tuple[np.random.Generator, MultiviewState]]]()
+"""What `begun` found, as long as a case is there."""
 
 
 def disturbed(rng: np.random.Generator, tracker: MultiviewTracker, state: MultiviewState) -> MultiviewState:

@@ -143,6 +143,7 @@ def test_what_was_recorded_can_be_tracked_again_and_a_background_file_is_taken_i
     assert np.median(np.abs(again.joints[:, neck] - motion.joints[:, neck])) < 0.15
 
 
+@pytest.mark.whole
 def test_a_film_without_an_empty_scene_is_tracked_after_its_first_seconds_by_its_name_alone(pictures, tmp_path, capsys):
     """Nobody steps out of the picture or stands still, and no picture is lost while the person is measured."""
     film = tmp_path / "film.mp4"

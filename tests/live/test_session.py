@@ -275,6 +275,7 @@ def test_a_scene_in_which_nothing_moves_is_taken_as_it_is(pictures):
     assert len(stage.session.scenes[0]) > 5
 
 
+@pytest.mark.whole
 def test_who_never_leaves_the_picture_is_tracked_and_measured_again(pictures):
     person = pictures[1]
     stage = Stage(SETTINGS, replace(OPTIONS, distance=None), live=False)

@@ -42,17 +42,16 @@ CLAIMS = {
 
 
 @pytest.fixture(scope="module")
-def out(tmp_path_factory) -> Path:
-    """All of them, small, in one process."""
-    folder = tmp_path_factory.mktemp("papers") / "ni2008"
-    assert main(["all", "--short", "--workers", "1", "--seed", str(SEED), "-o", str(folder)]) == 0
-    return folder
+def asked(tmp_path_factory) -> Request:
+    """What is asked for, small."""
+    return Request(tmp_path_factory.mktemp("papers") / "ni2008", seed=SEED, short=True)
 
 
 @pytest.fixture(scope="module")
-def asked(out) -> Request:
-    """What was asked, once more."""
-    return Request(out, seed=SEED, short=True)
+def out(asked) -> Path:
+    """All experiments, in one process."""
+    assert main(["all", "--short", "--workers", "1", "--seed", str(SEED), "-o", str(asked.output)]) == 0
+    return asked.output
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +137,8 @@ def test_a_given_recording_is_read_from_its_films(tmp_path, capsys):
     (["--recording", "nowhere"], "nowhere: no such recording"),
     (["--humaneva", "nowhere"], "nowhere"),
 ])
-def test_what_cannot_be_used_is_reported(tmp_path, capsys, words, told):
+def test_what_cannot_be_used_is_reported(tmp_path, capsys, monkeypatch, words, told):
+    monkeypatch.setattr(tracks, "follow", None)  # refused before anything is tracked
     assert main(["table_1", *words, "-o", str(tmp_path)]) == 2
     said = capsys.readouterr().err
     assert told in said
@@ -266,6 +266,7 @@ def test_all_methods_begin_alike_and_again_the_same(case):
     for one in found[1:]:
         np.testing.assert_array_equal(one.poses[0], found[0].poses[0])
     np.testing.assert_array_equal(tracks.follow(short, ways[0], 1).poses, found[0].poses)
+    np.testing.assert_array_equal(tracks.follow(replace(short), ways[0], 1).poses, found[0].poses)  # searched for anew
     other = [tracks.follow(short, way, 2).poses for way in ways[:2]]
     assert not np.array_equal(other[0][1], found[0].poses[1])
     assert 0.01 < np.abs(other[1][0] - found[1].poses[0]).max() < 0.6  # a method without chance has runs of its own, too

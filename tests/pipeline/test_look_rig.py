@@ -31,6 +31,7 @@ from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.track import track_recording
 
+pytestmark = pytest.mark.usefixtures("scale_unfitted")
 MASKS = Options(masks=True)
 
 
@@ -193,6 +194,7 @@ def test_swapped_films_are_reported(spoilt):
     assert any("cameras 'cam1' and 'cam2' are swapped" in doubt for doubt in looked(spoilt).doubts)
 
 
+@pytest.mark.whole
 def test_without_an_empty_scene_the_silhouettes_may_be_why_cameras_do_not_fit_together(spoilt):
     def turned(degrees, camera):
         a = np.radians(degrees)
@@ -234,6 +236,7 @@ def test_a_calibration_in_feet_is_doubted(spoilt):
     assert any("is it in metres?" in doubt for doubt in looked(spoilt).doubts)
 
 
+@pytest.mark.whole
 def test_a_camera_that_was_turned_is_named_on_the_command_line(spoilt, capsys):
     cameras = made_rig.cameras()
     a = np.radians(5)

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from shadowpuppet.body.whole_body import anatomical
-from shadowpuppet.camera.mask import Seen
+from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.errors import HARMFUL, NOTED
 from shadowpuppet.io.motion.table import write_joints
-from shadowpuppet.io.person import read_person
+from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.run import Run, read_run
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline import person_rig
@@ -30,13 +30,22 @@ from shadowpuppet.tracking.multiview.settings import for_smeared
 from shadowpuppet.tracking.multiview.size_estimation import Front
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
 
+pytestmark = pytest.mark.usefixtures("scale_unfitted")
 FRAMES = 16
-QUICK = {"masks": True, "multiview": {"particles": 16}, "training": {"regions": 6, "starts": 1}}
+QUICK = {"masks": True, "multiview": {"particles": 16, "cycles": 1, "hull": {"rays": 600}}, "training": {"regions": 6, "starts": 1}}
+FEW = {"masks": True, "multiview": {"particles": 4, "hull": {"rays": 300}}}
+"""For laws that do not depend on how well a body fits."""
 TRUE = actor.sizes(thigh_width=1.15, waist_depth=1.2, upper_arm_length=1.04)
 
 
 def poses_at(rate: float, frames: int, begin: float = 0.0) -> np.ndarray:
     return actor.walk(anatomical(TRUE).skeleton, frames, rate, begin)
+
+
+def views(frames: int) -> list[list[Mask]]:
+    """Silhouettes of the walk by frame and camera."""
+    body = anatomical(TRUE)
+    return [actor.masks(body, pose) for pose in poses_at(made_rig.RATE, frames)]
 
 
 def table(poses: np.ndarray, rate: float) -> JointTable:
@@ -47,9 +56,8 @@ def table(poses: np.ndarray, rate: float) -> JointTable:
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory) -> Path:
     """Somebody not quite average who walks among five cameras, and another take of it to learn from."""
-    poses, body = poses_at(made_rig.RATE, FRAMES), anatomical(TRUE)
-    folder = made_rig.write(tmp_path_factory.mktemp("made") / "walk", actor.cameras(), [actor.masks(body, pose) for pose in poses])
-    write_joints(folder / "truth.csv", table(poses, made_rig.RATE))
+    folder = made_rig.write(tmp_path_factory.mktemp("made") / "walk", actor.cameras(), views(FRAMES))
+    write_joints(folder / "truth.csv", table(poses_at(made_rig.RATE, FRAMES), made_rig.RATE))
     write_joints(folder / "training.csv", table(poses_at(20.0, 60, 0.3), 20.0))
     return folder
 
@@ -78,7 +86,7 @@ def errors(run: Run) -> np.ndarray:
 
 
 def tracked(shell, recording, *tokens) -> Run:
-    few = ("--multiview.particles", 6, "--training.regions", 6)
+    few = ("--multiview.particles", 6, "--multiview.cycles", 1, "--multiview.hull.rays", 300, "--training.regions", 6)
     code, _, err = shell("track", recording, "-o", "run", "--quiet", "--force", "--masks", *few, *tokens)
     assert code == 0, err
     assert all(line.startswith("warning: camera") for line in err.splitlines()), err
@@ -157,24 +165,22 @@ def test_a_front_that_hardly_fits_better_is_doubted():
     assert len(said.short.split()) <= 10
 
 
-def test_the_first_search_is_about_a_doubted_front(untaught, monkeypatch):
-    options, facing = make_options(QUICK), []
-    survey = survey_rig(open_rig(untaught, options), options)
-    subject = person_rig.fit_multiview(np.random.default_rng(0), survey, options)
+def test_the_first_search_is_about_a_doubted_front(monkeypatch):
+    rng, facing = np.random.default_rng(0), []
+    subject = person_rig.known_person(rng, actor.cameras(), make_options(FEW), made_rig.RATE, Person(TRUE, 1.75, "known"), {}, True)
     start = MultiviewTracker.start
     monkeypatch.setattr(MultiviewTracker, "start", lambda self, *given, **named: facing.append(named) or start(self, *given, **named))
-    seen = [subject.observe(Seen(masks)) for masks in survey.first.masks[:2]]
+    seen = [subject.observe(Seen(masks)) for masks in views(2)]
     doubted = dataclasses.replace(subject, front=Front(0.3, seen[0].points.points.mean(0), 0.1))
     for person, observation in ((subject, seen[0]), (doubted, seen[0]), (doubted, seen[1])):
         person.next_state(np.random.default_rng(0), None, observation)
     assert facing == [{"facing": None}, {"facing": 0.3}, {"facing": None}]
 
 
-def test_only_a_height_that_was_estimated_is_doubted(untaught, monkeypatch):
+def test_only_a_height_that_was_estimated_is_doubted(monkeypatch):
     monkeypatch.setattr(person_rig, "SURE_OVERLAP", 2.0)
-    for path, options, number in ((untaught, {"height": 1.75}, 0), (untaught, {}, 1)):
-        set_to = make_options(QUICK | options)
-        fitted = person_rig.fit_multiview(np.random.default_rng(0), survey_rig(open_rig(path, set_to), set_to), set_to)
+    for options, number in ((FEW | {"height": 1.75}, 0), (FEW, 1)):
+        fitted = person_rig.fit_in_views(np.random.default_rng(0), actor.cameras(), views(2), make_options(options), made_rig.RATE)
         assert len(fitted.doubts) == number
 
 
@@ -190,6 +196,7 @@ def test_sizes_of_an_earlier_run_are_used_again(untaught, run, shell):
     assert errors(again).mean() < 0.04
 
 
+@pytest.mark.whole
 def test_without_training_sizes_come_from_the_height_or_from_what_is_seen(untaught, shell, monkeypatch):
     monkeypatch.setattr(person_rig, "AVERAGE_HEIGHT", 1.0)  # which is for those of whom nothing is seen
     found = tracked(shell, untaught, "--height", 1.75)
@@ -212,9 +219,10 @@ def test_the_paper_s_preset_runs(recording, shell):
     assert tomllib.loads(Path("run/person.toml").read_text())["body"] == "cylinders"
 
 
+@pytest.mark.whole
 def test_a_prior_is_learnt_once_and_taken_from_its_file(recording, untaught, shell):
     assert shell("fit-prior", recording / "training.csv", "-o", "walk.npz", "--regions", 6, "--rate", 20)[0] == 0
-    assert errors(tracked(shell, untaught, "--prior", "walk.npz")).mean() < 0.06
+    assert errors(tracked(shell, untaught, "--prior", "walk.npz", "--height", 1.75)).mean() < 0.06
     assert shell("fit-prior", recording / "training.csv", "-o", "other.npz", "--regions", 6, "--body", "cylinders")[0] == 0
     Path("run").rename("first")
     assert "other.npz: prior: found" in refused(shell, untaught, "--prior", "other.npz")

@@ -19,6 +19,7 @@ from shadowpuppet.pipeline.rig import FrameSet, open_rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
 from shadowpuppet.pipeline.track import Listener, run, track_recording
 
+pytestmark = pytest.mark.usefixtures("scale_unfitted")
 QUICK = {"tracker": {"cycles": 1, "explore": 20}, "initialization": {"rounds": 20, "patience": 5, "sweeps": 2}}
 
 
@@ -133,6 +134,7 @@ def test_a_full_store_holds_nothing():
     assert store.size > store.limit
 
 
+@pytest.mark.whole
 def test_several_cameras_share_silhouettes_between_seeds(rig_recording, tmp_path, monkeypatch):
     cache = SilhouetteCache()
     kind = MULTIVIEW._replace(fit=lambda rng, survey, options: followed(survey.rig.cameras))

@@ -25,6 +25,7 @@ from shadowpuppet.pipeline.rig import open_rig, read_frames
 from shadowpuppet.pipeline.track import run
 from shadowpuppet.video import open_frames
 
+pytestmark = pytest.mark.usefixtures("scale_unfitted")
 made_of = []
 
 

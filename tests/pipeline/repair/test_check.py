@@ -47,7 +47,7 @@ def test_an_untouched_recording_is_good(recording, options):
 
 
 @pytest.fixture
-def again(recording, cameras):
+def again(recording, cameras, scale_unfitted):
     """With another calibration; as it was afterwards."""
     yield lambda changed: write_calibration(recording / "calibration.toml", changed) or recording
     write_calibration(recording / "calibration.toml", cameras)
@@ -62,6 +62,7 @@ def test_a_camera_that_was_turned_is_named_with_its_turn(again, cameras):
     assert found.late == ()
 
 
+@pytest.mark.usefixtures("scale_unfitted")
 def test_a_late_film_is_reported_with_what_mends_it(tmp_path, cameras, masks):
     folder = made_rig.write(tmp_path / "r", cameras, made_rig.shifted(masks, (0, 0, 4, 0)))
     found = checked(folder)
@@ -73,6 +74,7 @@ def test_a_late_film_is_reported_with_what_mends_it(tmp_path, cameras, masks):
     assert checked(folder).good
 
 
+@pytest.mark.usefixtures("scale_unfitted")
 def test_turned_and_late_at_once(tmp_path, cameras, masks):
     turned = [*cameras[:2], made_rig.moved(cameras[2], down=4), cameras[3]]
     folder = made_rig.write(tmp_path / "r", turned, made_rig.shifted(masks, (0, 0, 4, 0)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import made_rig
 import noises
 import numpy as np
@@ -16,6 +18,7 @@ from shadowpuppet.pipeline.repair.films import check_films
 from shadowpuppet.pipeline.repair.fix import fix_recording
 from shadowpuppet.pipeline.rig import open_rig
 
+pytestmark = pytest.mark.usefixtures("scale_unfitted")
 MASKS = Options(masks=True)
 RATE = 16000
 LATE = (0, 8, 0, -3)
@@ -23,12 +26,17 @@ LATE = (0, 8, 0, -3)
 SECONDS = 6.0
 
 
+@cache
+def seen(n):
+    """Silhouettes of frame `n`."""
+    return made_rig.masks(made_rig.cameras(), 1, n)[0]
+
+
 def films(folder, frames_of, late):
     """A recording of 60 frames; camera k shows frame `frames_of(n, k)` as its n-th, and is heard `late[k]` frames late; silent if None."""
     cameras = made_rig.cameras()
     count = round(SECONDS * made_rig.RATE)
-    every = made_rig.masks(cameras, count + 32)
-    path = made_rig.write(folder, cameras, [[every[frames_of(n, k)][k] for k in range(len(cameras))] for n in range(count)])
+    path = made_rig.write(folder, cameras, [[seen(frames_of(n, k))[k] for k in range(len(cameras))] for n in range(count)])
     if late is None:
         return path
     rng = np.random.default_rng(3)
@@ -61,6 +69,7 @@ def test_a_still_person_s_films_are_put_in_step_by_what_is_heard(still):
     assert (again.by_clock, again.late, again.good) == (False, (), True)
 
 
+@pytest.mark.whole
 def test_sound_that_lags_behind_its_pictures_is_doubted_and_changes_nothing(tmp_path):
     path = films(tmp_path / "lag", lambda n, k: n + 12, LATE)  # the pictures are in step
     rig = open_rig(path, MASKS)
@@ -80,6 +89,7 @@ def test_sound_and_silhouettes_that_agree_are_both_stated(tmp_path):
     assert not any("sound and silhouettes" in doubt for doubt in found.doubts)
 
 
+@pytest.mark.whole
 def test_films_that_are_far_from_in_step_are_found_by_sound_first(tmp_path):
     late, heard = (0, 32, 0, 0), (0, 30, 0, 0)  # more than silhouettes are searched for; of what is left they know better
     path = films(tmp_path / "far", lambda n, k: n + 32 - late[k], heard)

@@ -161,6 +161,7 @@ def test_a_recording_without_calibration_is_placed_from_rough_toml(lab, tmp_path
         assert abs(camera.matrix[0, 0] / true.matrix[0, 0] - 1) > 1e-5  # it was solved, not copied
 
 
+@pytest.mark.whole
 def test_silent_films_that_begin_apart_are_put_in_step_while_cameras_are_placed(tmp_path):
     exact, late, frames = made_rig.cameras(), (0, 4, 0, -3), 80
     seen = made_rig.masks(exact, frames + 20)

@@ -93,6 +93,7 @@ def test_known_sizes_are_kept_and_the_person_is_looked_for_all_the_same():
     assert found.overlap > 0.9
 
 
+@pytest.mark.whole
 def test_the_same_seed_measures_the_same():
     spread = size_deviations(MEAN, shown=True)
     one, other = (measured(spread) for _ in range(2))
