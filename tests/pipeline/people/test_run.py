@@ -68,10 +68,13 @@ class Kills(Listener):
     """Keeps the folder of a run as it is when a process is killed after some of its frames."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
+        self.folder, self.now = folder, ""
+
+    def begin(self, title: str, total: int | None = None) -> None:
+        self.now = title
 
     def advance(self, frames: int) -> None:
-        if frames in KILLED:
+        if self.now == "tracking" and frames in KILLED:
             for name in (f"killed-{frames}", f"killed-{frames}-spare"):
                 shutil.copytree(self.folder, self.folder.with_name(name))
 
