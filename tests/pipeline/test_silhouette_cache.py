@@ -56,7 +56,7 @@ def test_an_overlay_has_the_films_pictures(track, tmp_path):
     cache = SilhouetteCache()
     track(cache)
     plain = track()[0]
-    assert track(cache, overlay=True) == (plain, False)
+    assert track(cache, overlay=True) == (plain, True)
     assert len(made.images(tmp_path / "run" / "overlay.mp4")) == made.FRAMES
 
 

@@ -22,6 +22,7 @@ from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.metrics import jitter, overlap
 from shadowpuppet.pipeline.footage import RUN, RUNS, CameraFrame, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options, plain_options, read_options
+from shadowpuppet.pipeline.person import MonocularSubject
 from shadowpuppet.pipeline.prepare import MONOCULAR, MULTIVIEW, fit_person, look_at
 from shadowpuppet.pipeline.progress import StageTimer
 from shadowpuppet.pipeline.silhouette_cache import MaskStore
@@ -185,7 +186,30 @@ def test_a_run_that_breaks_off_keeps_what_it_has(recording, run, tmp_path, error
     assert not (left.folder / "raw.csv").exists()
     assert "smoothing" not in left.info
     assert left.metrics["ms_per_frame"]["track"] > 0
-    assert len(made.images(tmp_path / "run" / "overlay.part.mp4")) == 5
+    assert not list((tmp_path / "run").glob("overlay*"))  # it is drawn when the film is over
+
+
+def test_an_overlay_shows_the_motion_that_is_written(recording, tmp_path, monkeypatch):
+    drawn, draw = [], MonocularSubject.draw
+
+    def noted(self, frames, found, last=None):
+        drawn.append((frames.time, found))
+        return draw(self, frames, found, last)
+
+    monkeypatch.setattr(MonocularSubject, "draw", noted)
+    run = track_recording(recording, tmp_path / "run", make_options(QUICK | {"overlay": True}))
+    assert len(drawn) == len(run.motion)
+    np.testing.assert_array_equal([time for time, _ in drawn], run.motion.times)
+    np.testing.assert_array_equal([found.pose for _, found in drawn], run.motion.poses)
+    assert not np.array_equal(run.motion.joints, read_raw(run.folder / "raw.csv", "rounded").joints)
+
+
+def test_silhouettes_that_were_too_many_to_be_kept_are_made_again_for_an_overlay(recording, run, tmp_path, monkeypatch):
+    monkeypatch.setattr(MaskStore, "add", lambda *_: None)
+    other = track_recording(recording, tmp_path / "run", make_options({"overlay": True, "tracker": {"both_ways": False}}))
+    assert len(made.images(other.folder / "overlay.mp4")) == len(other.motion)
+    ours, theirs = (made.images(each.folder / "overlay.mp4")[10].astype(int) for each in (other, run))
+    assert np.abs(ours - theirs).mean() < 10
 
 
 def test_a_run_that_never_began_leaves_the_last_one(recording, run, tmp_path):

@@ -133,13 +133,14 @@ class SilhouetteCache:
         """Keep another survey of the same film, whose silhouettes differ."""
         self._survey, self._store = survey.settled(), MaskStore(self.limit)
 
-    def is_complete(self, options: Options) -> bool:
-        """Whether all silhouettes of the surveyed recording are kept and can be used; not with an overlay, which needs the images."""
-        return self._store.complete and not options.overlay
+    @property
+    def is_complete(self) -> bool:
+        """Whether all silhouettes of the surveyed recording are kept."""
+        return self._store.complete
 
-    def frames(self, frames: Generator[FrameSet], options: Options) -> Generator[FrameSet]:
+    def frames(self, frames: Generator[FrameSet]) -> Generator[FrameSet]:
         """The kept frame sets, without images, if they are complete; else `frames`, whose masks are then kept."""
-        if self.is_complete(options):
+        if self.is_complete:
             yield from self._store
         else:
             self._store = MaskStore(self.limit)

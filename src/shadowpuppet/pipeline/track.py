@@ -21,6 +21,7 @@ from shadowpuppet.pipeline.prepare import MONOCULAR, MULTIVIEW, Kind, Prepared, 
 from shadowpuppet.pipeline.progress import Listener, StageTimer, Summary, generators, json_text, judge, set_aside, summary, timings, tracked
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
+from shadowpuppet.pipeline.stages.show import drawings, show_run
 from shadowpuppet.pipeline.stages.smooth import backward, check_smoothing, smooth_run
 from shadowpuppet.pipeline.stages.write import Written
 from shadowpuppet.pipeline.subject import Before, Observation, State, motion_frame
@@ -54,7 +55,7 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
 
 def run(rig: Rig, kind: Kind[State, Observation, Before], folder: str | Path, options: Options, listener: Listener,
         cache: SilhouetteCache | None = None, resume: bool = False) -> Summary:
-    """Survey, fit, track, smooth and judge; see `track_recording`."""
+    """Survey, fit, track, smooth, show and judge; see `track_recording`."""
     for_look, for_track = generators(options)
     check_options(options, rig)
     with run_writer(rig, kind, folder, options, resume) as writer:
@@ -63,14 +64,17 @@ def run(rig: Rig, kind: Kind[State, Observation, Before], folder: str | Path, op
         if survey.several and (survey.look.refusal is None or options.anyway):
             return _run_people(writer, survey.settled(), options, listener, (for_look, for_track))
         prepared = fit_survey(for_look, survey, options, kind, cache, listener)
-        writer.metrics |= {"kept_silhouettes": True} if cache is not None and cache.is_complete(options) else {}
+        writer.metrics |= {"kept_silhouettes": True} if cache is not None and cache.is_complete else {}
         writer.metrics["look_s"] = round(time.perf_counter() - start, 3)
         listener.look(prepared.look)
         check_smoothing(options, prepared.look.rate)
         subject = prepared.check()
         leans, state, store = _track(writer, prepared, kind, options, listener, for_track, cache)
-        motion = writer.motion if store is None else backward(writer, subject.turned_back(state), options, listener, store)
+        motion = writer.motion
+        if subject.both_ways and options.smoothing[0] != "off":
+            motion = backward(writer, subject.turned_back(state), options, listener, store)
         smooth_run(writer, [(0, subject)], options, listener, motion, leans)
+        show_run(writer, prepared.survey, options, listener, store, drawings(subject, writer.motion))
         found = judge(writer, rig, prepared.look, subject.person, options)
     return summary(folder, found, prepared.look)
 
@@ -84,7 +88,7 @@ def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: L
     check_smoothing(options, survey.look.rate)
     entries = {key: value for key, value in writer.info.items() if key not in (*OWN_KEYS, "people", "truth")}
     people = PeopleRun(writer, survey, survey.census, options, entries, listener)
-    found = people.track(*rngs, smooth_run)
+    found = people.track(*rngs, smooth_run, show_run)
     if not found:
         raise TrackingError(f"{survey.look.recording}: nobody is found in the silhouettes of {survey.census.number} people")
     if len(found) < min(survey.census.number, options.people or survey.census.number):
@@ -102,19 +106,18 @@ def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: L
 
 def _track(writer: RunWriter, prepared: Prepared[State, Observation, Before], kind: Kind[State, Observation, Before], options: Options,
            listener: Listener, rng: np.random.Generator,
-           cache: SilhouetteCache | None) -> tuple[Sequence[float], State | None, MaskStore | None]:
+           cache: SilhouetteCache | None) -> tuple[Sequence[float], State | None, MaskStore]:
     """Decode, segment, observe, track, doubt and write each frame set. Returns the `lean` of each, the last state, and the silhouettes if
-    they are to be tracked backward, too."""
-    subject, survey, timer = prepared.check(), prepared.survey, StageTimer()
-    store = MaskStore() if subject.both_ways and options.smoothing[0] != "off" else None
-    rows, watch = Written(writer, prepared, options, rng), RigWatch(len(survey.rig.footage), survey.rig.short)
+    they are to be tracked backward or drawn, too."""
+    subject, survey, timer, store = prepared.check(), prepared.survey, StageTimer(), MaskStore()
+    kept = store if options.overlay or (subject.both_ways and options.smoothing[0] != "off") else None
+    rows, watch = Written(writer, prepared, rng), RigWatch(len(survey.rig.footage), survey.rig.short)
     state, before = rows.carried.state, rows.carried.before
     listener.begin("tracking", tracked(prepared.look.frames, options.every))
     began = time.perf_counter()
     try:
         with ExitStack() as stack:
-            stack.enter_context(rows.shown(prepared.look.rate))
-            frames = _segmented(stack, survey, options, watch, cache, store)
+            frames = _segmented(stack, survey, options, watch, cache, kept)
             for found in rows.repeated(frames):
                 watch.tracked(subject.drawn(found))
             observed = stack.enter_context(closing(subject.observations(frames)))
@@ -137,9 +140,9 @@ def _track(writer: RunWriter, prepared: Prepared[State, Observation, Before], ki
 def _segmented(stack: ExitStack, survey: Survey, options: Options, watch: RigWatch, cache: SilhouetteCache | None,
                store: MaskStore | None) -> Iterator[FrameSet]:
     """The decoded and segmented frame sets, without the masks of cameras that are set aside; kept ones, if the cache has them."""
-    task = Task(survey.rig, survey.silhouettes, options.masks, options.every, images=options.overlay, corrected=False, codes=True)
+    task = Task(survey.rig, survey.silhouettes, options.masks, options.every, images=False, corrected=False, codes=True)
     frames = stack.enter_context(closing(frames_beside(task)))
     if cache is not None:
-        frames = stack.enter_context(closing(cache.frames(frames, options)))
+        frames = stack.enter_context(closing(cache.frames(frames)))
     seen = (now._replace(seen=watch(now.time, now.seen)) for now in frames)
     return seen if store is None else stack.enter_context(closing(store.stored(seen)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.bits import Bits
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import SettingsError, ShadowPuppetError, TrackingError
 from shadowpuppet.io.inputs.inputs import NO_INPUTS, Resuming
 from shadowpuppet.io.people import open_places, person_folder, write_place
@@ -35,7 +36,6 @@ from shadowpuppet.pipeline.people.state import TYPES, Measured, PeopleState, Per
 from shadowpuppet.pipeline.people.truths import matched_truths
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.pipeline.progress import (
-    FALLBACK_RATE,
     STAGES,
     Checkpoints,
     Listener,
@@ -50,15 +50,18 @@ from shadowpuppet.pipeline.progress import (
     write_beside,
 )
 from shadowpuppet.pipeline.rig import FrameSet, Rig
+from shadowpuppet.pipeline.silhouette_cache import MaskStore
 from shadowpuppet.pipeline.subject import joint_names
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 from shadowpuppet.tracking.people.presence import Followed, Sighting
-from shadowpuppet.video import write_frames
+from shadowpuppet.video import Image
 
 Smooth = Callable[[RunWriter, Sequence[tuple[int, MultiviewSubject]], Options, Listener, Motion], None]
 """Replaces the motion of a run by a given one, smoothed."""
+Show = Callable[[RunWriter, Survey, Options, Listener, MaskStore, Iterable[Callable[[FrameSet], Image]]], None]
+"""Writes the overlay of frame sets, each drawn by a function."""
 
 
 def check_people(options: Options) -> None:
@@ -101,10 +104,12 @@ class PeopleRun:
         self.folder: Path = self.writer.folder
         self.writers = dict[int, RunWriter]()
         self.metrics = dict[str, Any]()
-        self.sets = 0
-        """Number of frame sets that were read."""
+        self.times = list[float]()
+        """Of the frame sets that were read, seconds."""
+        self.store = MaskStore()
+        """Their silhouettes, if an overlay is asked for."""
 
-    def track(self, for_fit: np.random.Generator, for_track: np.random.Generator, smooth: Smooth) -> dict[int, dict[str, Any]]:
+    def track(self, for_fit: np.random.Generator, for_track: np.random.Generator, smooth: Smooth, show: Show) -> dict[int, dict[str, Any]]:
         """Track all people; returns each person's metrics by number, none if no person is found."""
         carried: Carried | None = self.writer.hand_over((*TYPES, Carried))
         if carried is not None and not is_same_look(carried.look, json_text(self.survey.look)):
@@ -117,6 +122,7 @@ class PeopleRun:
             for number, motion in put_right(people, motions, group.subject).items():
                 subject = group.subject(people.people[number - 1].measured)
                 smooth(self.writers[number], [(0, subject)], self.options, self.listener, motion)
+            show(self.writer, self.survey, self.options, self.listener, self.store, self._drawings(group, people))
             truths = matched_truths({n: writer.motion for n, writer in self.writers.items()}, self.rig.recording.truths)
             for n, truth in truths.items():
                 self.writers[n].info["truth"] = str(truth.resolve())
@@ -126,13 +132,21 @@ class PeopleRun:
         warn_of_set_aside(self.metrics.get("set_aside", []))
         return found
 
+    def _drawings(self, group: Group, people: PeopleState) -> Iterator[Callable[[FrameSet], Image]]:
+        """Draws all people's motions in each frame set."""
+        found: dict[float, list[tuple[int, MotionFrame, Sequence[Picture]]]] = {time: [] for time in self.times}
+        for number, writer in self.writers.items():
+            for frame in writer.motion.frames():
+                found[frame.time].append((number, frame, group.subject(people.people[number - 1].sizes_at(frame.time)).pictures))
+        yield from (partial(overlay_of_people, people=each) for each in found.values())
+
     def _finished(self, number: int, truth: Path | None) -> dict[str, Any]:
         """The metrics of a person's finished run, written into its folder."""
         folder = person_folder(self.folder, number)
         run = read_run(folder)
         recording = replace(self.rig.recording, truth=truth)
         metrics = run.metrics | evaluated(replace(self.rig, recording=recording), run.motion)
-        frames = self.sets, tracked(self.survey.look.frames, self.options.every)
+        frames = len(self.times), tracked(self.survey.look.frames, self.options.every)
         metrics["verdict"] = verdict_of_run(self.survey.look, run.motion, self.metrics.get("set_aside", ()), frames).plain()
         write_metrics(folder, metrics)
         return metrics
@@ -175,31 +189,28 @@ class PeopleRun:
         survey, options, timer, checkpoints = self.survey, self.options, StageTimer(), Checkpoints()
         look = survey.look
         assert isinstance(look, RigLook)
-        rate = look.rate if np.isfinite(look.rate) else FALLBACK_RATE
         watch = RigWatch(len(self.rig.footage), self.rig.short)
         self.listener.begin("tracking", tracked(look.frames, options.every))
         began = time.perf_counter()
         write_beside(self.folder, look, self.rig)
         places = stack.enter_context(open_places(self.folder, None if carried is None else carried.size))
-        overlay = stack.enter_context(write_frames(self.folder / "overlay.mp4", rate / options.every)) if options.overlay else None
-        task = Task(self.rig, survey.silhouettes, options.masks, options.every, images=options.overlay, corrected=options.appearance,
-                    hull=group.hull)
+        task = Task(self.rig, survey.silhouettes, options.masks, options.every, images=False, corrected=options.appearance, hull=group.hull)
         frames = stack.enter_context(closing(frames_beside(task)))
         clear = [] if carried is None else carried.clear.tolist()
         earlier = iter(self._earlier(group, people, carried, stack))
 
-        def judged(now: FrameSet, found: Mapping[int, MotionFrame], is_clear: bool) -> None:
-            subjects = {n: group.subject(people.people[n - 1].sizes_at(frame.time)) for n, frame in found.items()}
-            drawn = [subjects[n].drawn(frame) for n, frame in found.items()]
+        def judged(found: Mapping[int, MotionFrame], is_clear: bool) -> None:
+            drawn = [group.subject(people.people[n - 1].sizes_at(frame.time)).drawn(frame) for n, frame in found.items()]
             watch.tracked(_together(drawn) if is_clear else ())
-            if overlay is not None:
-                overlay.write(overlay_of_people(now, [(n, frame, subjects[n].pictures) for n, frame in found.items()]))
 
         try:
             for now in timer.each("wait", frames):
                 seen = watch(now.time, now.seen)
+                self.times.append(now.time)
+                if options.overlay:
+                    self.store.add(now.time, seen)
                 if (known := next(earlier, None)) is not None:
-                    judged(now, *known)
+                    judged(*known)
                     continue
                 timer.add(decode=now.decoding, segment=now.segmenting, hull=now.carving)
                 with timer.time("hull"):
@@ -211,11 +222,10 @@ class PeopleRun:
                 with timer.time("write"):
                     found = self._write(group, people, stack, places)
                     clear.append(people.is_clear)
-                    judged(now, found, clear[-1])
+                    judged(found, clear[-1])
                     checkpoints.keep(partial(self._keep, people, places, clear))
                 self.listener.advance(len(clear))
         finally:
-            self.sets = len(clear)
             count = len(clear) - (0 if carried is None else len(carried.clear))
             self.metrics |= timings(timer, STAGES, count, time.perf_counter() - began) | set_aside(watch.intervals, self.rig.names)
         return people

@@ -1,10 +1,9 @@
-"""The write stage: each frame's rows and overlay, a checkpoint about every second, and the frames of an earlier run that goes on."""
+"""The write stage: each frame's rows, a checkpoint about every second, and the frames of an earlier run that goes on."""
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
 from functools import partial
 from typing import Generic, NamedTuple
 
@@ -12,11 +11,9 @@ import numpy as np
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.io.run_writer import RunWriter
-from shadowpuppet.motion.motion import BLANK, MotionFrame
-from shadowpuppet.pipeline.options import Options
+from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.pipeline.prepare import Prepared
 from shadowpuppet.pipeline.progress import (
-    FALLBACK_RATE,
     Checkpoints,
     LeftOut,
     LeftOutEntry,
@@ -28,7 +25,6 @@ from shadowpuppet.pipeline.progress import (
 )
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.pipeline.subject import Before, Observation, State
-from shadowpuppet.video import FrameWriter, write_frames
 
 
 class Carried(NamedTuple, Generic[State, Before]):
@@ -48,40 +44,29 @@ class Carried(NamedTuple, Generic[State, Before]):
 class Written(Generic[State, Observation, Before]):
     """Writes what a run finds in each frame, after the frames of an earlier run that goes on."""
 
-    def __init__(self, writer: RunWriter, prepared: Prepared[State, Observation, Before], options: Options,
-                 rng: np.random.Generator) -> None:
+    def __init__(self, writer: RunWriter, prepared: Prepared[State, Observation, Before], rng: np.random.Generator) -> None:
         """Begin the tables at the start, or after the frames of a checkpoint, which sets the random generator. Raises
         `ShadowPuppetError` if the look was another one."""
-        self.writer, self.survey, self.rng, self.subject, self.options = writer, prepared.survey, rng, prepared.check(), options
+        self.writer, self.survey, self.rng, self.subject = writer, prepared.survey, rng, prepared.check()
         self.carried, self.earlier = self._resumed(json_text(prepared.look))
         self.leans = array("d")
         """`TrackedSubject.lean` of each frame."""
         self.count = len(self.earlier)
         self._left_out, self._checkpoints = self.carried.left_out, Checkpoints()
-        self._overlay: FrameWriter | None = None
-        self._last: MotionFrame | None = None
         writer.begin()
         write_beside(writer.folder, prepared.look, self.survey.rig, self.subject.person)
 
-    @contextmanager
-    def shown(self, rate: float) -> Iterator[None]:
-        """Context in which overlay.mp4 is written, at a film's rate (frames/s), if it is asked for."""
-        rate = (rate if np.isfinite(rate) else FALLBACK_RATE) / self.options.every
-        with write_frames(self.writer.folder / "overlay.mp4", rate) if self.options.overlay else nullcontext() as self._overlay:
-            yield
-            self.writer.check()  # before the overlay gets its name
-
     def repeated(self, frames: Iterable[FrameSet]) -> Iterator[MotionFrame]:
-        """What the earlier run found in the first of the frames, shown again."""
+        """What the earlier run found in the first of the frames."""
         for found, now in zip(self.earlier, frames):
             yield found
-            self._show(now, found)
+            self.leans.append(self.subject.lean(found, now.seen.masks))
 
     def write(self, now: FrameSet, found: MotionFrame, state: State | None, before: Before | None) -> None:
         """Write what is found in a frame; `state`, `before`: what the next frame needs."""
         self._left_out = add_left_out(self._left_out, now.time, self.subject.left_out(state))
         self.writer.write(found)
-        self._show(now, found)
+        self.leans.append(self.subject.lean(found, now.seen.masks))
         carried = self.carried._replace(generator=self.rng.bit_generator.state, state=self.subject.kept(state), before=before,
                                         left_out=self._left_out)
         self._checkpoints.keep(partial(self.writer.checkpoint, carried))
@@ -91,13 +76,6 @@ class Written(Generic[State, Observation, Before]):
     def left_out(self) -> dict[str, list[LeftOutEntry]]:
         """The entry `left_out` of metrics.json."""
         return left_out_metrics(self._left_out, [footage.view.camera for footage in self.survey.rig.footage])
-
-    def _show(self, now: FrameSet, found: MotionFrame) -> None:
-        self.leans.append(self.subject.lean(found, now.seen.masks))
-        self._last = self._last if found.status in BLANK else found
-        if self._overlay is not None:
-            images = (None if image is None else each.steadied(image) for each, image in zip(self.survey.silhouettes, now.images))
-            self._overlay.write(self.subject.draw(now._replace(images=tuple(images)), found, self._last))
 
     def _resumed(self, look: str) -> tuple[Carried[State, Before], list[MotionFrame]]:
         """Where the run begins, and the frames before, by the text of look.json."""
