@@ -49,6 +49,8 @@ def test_the_factor_has_the_doubt_of_moments_and_of_an_unknown_height():
     assert "--height" in unknown.caution()
     assert "check --fix" in known.caution()
     assert known.caution().severity == RUINOUS
+    assert known.caution().evidence == {"height": known.height, "expected": 1.75, "factor": known.factor,
+                                        "within": known.factor * known.doubt}
     assert "too small, 0.57" in ScaleError(height=1.0, expected=1.75, is_known=True, doubt=0.02).caution()
 
 
