@@ -82,10 +82,10 @@ def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, fil
               *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     doubts += [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
     if not refusal:
-        seen = [each.masks for each in spread] or first.masks
-        moments = moments_of(rig.cameras, seen, options.multiview)  # also of several people: a wrong scale makes two of one
-        scale = error_in(rig, moments, options)
-        found = (None if scale is None else scale.caution(), None if several else up_caution(rig.cameras, moments, options.multiview))
+        # also of several people: a wrong scale makes two of one
+        scale = error_in(rig, moments_of(rig.cameras, first.masks, options.multiview), options)
+        walk = [] if several else moments_of(rig.cameras, [seen.masks for seen in spread], options.multiview)
+        found = (None if scale is None else scale.caution(), up_caution(rig.cameras, walk, options.multiview))
         doubts = [each for each in found if each is not None] + doubts
     if several and options.people != 1:
         doubts.insert(0, Finding.of("{people} people are in the recording: each is tracked, into person-1, person-2, ... of the run",

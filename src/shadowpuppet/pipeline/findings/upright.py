@@ -19,8 +19,6 @@ END = 0.1
 """Share of the height that counts as its upper and its lower end: head, and feet."""
 WALKED = 0.2
 """Least way of the middle of a person who walks, over the height."""
-LYING = 45.0
-"""Least angle between Z and the long axis of a person who lies, degrees."""
 
 
 @one_blas_thread()
@@ -41,9 +39,10 @@ def up_caution(cameras: Sequence[Camera], moments: Sequence[Moment], settings: M
     axes = np.array([np.linalg.svd(each - middle, full_matrices=False)[2][0] for each, middle in zip(points, middles)])
     off = np.degrees(np.arccos(np.minimum(np.abs(axes[:, 2]), 1)))
     along = "xyz"[int(np.abs(axes).mean(0).argmax())]
-    if (off > LYING).all():
+    lies = off > 45
+    if lies.all():
         seen, ups = "lies in all frames of a walk of {way:.1f} m, {off:.0f} degrees off Z", (along, f"-{along}")
-    elif not (off > LYING).any() and 2 * sum(map(_is_top_heavy, points)) > len(points):
+    elif not lies.any() and 2 * sum(map(_is_top_heavy, points)) > len(points):
         seen, ups = "stands on the head in all frames of a walk of {way:.1f} m", ("z", "-z")
     else:
         return None
