@@ -135,7 +135,7 @@ def judge_calibration(rig: Rig, sets: SilhouetteSets, ready: bool = False) -> Ca
     """Test the calibration of `rig` against silhouettes, made or `ready`. Raises `RecordingError` if no two cameras see a person at the
     same time."""
     if sum(sum(silhouette is not None for silhouette in row) > 1 for row in sets.rows) < 2:
-        seen, asked = (("the masks of no two cameras show", "is mask n of each camera frame n of its film, and do the masks hold the person?")
+        seen, asked = (("the masks of no two cameras show", "is mask n of each camera frame n of its film, and do they hold the person?")
                        if ready else ("no two cameras see", "do the films belong together?"))
         raise RecordingError(f"{rig.recording.path}: {seen} a person at the same time: {asked}")
     found = _judged(rig, sets.rows)
