@@ -12,6 +12,7 @@ from solids import seen_by
 from shadowpuppet.errors import HARMFUL
 from shadowpuppet.pipeline.findings import delays
 from shadowpuppet.pipeline.findings.delays import delay_cautions
+from shadowpuppet.pipeline.findings.look import FirstSeconds
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.prepare import look_at
 from shadowpuppet.pipeline.rig import open_rig
@@ -25,8 +26,8 @@ def seen(cameras):
     return made_rig.masks(cameras, 60)
 
 
-def said(rig):
-    return delay_cautions(rig, [Silhouettes("made", None)] * len(rig.cameras), ready=True)
+def said(rig, first=()):
+    return delay_cautions(rig, [Silhouettes("made", None)] * len(rig.cameras), FirstSeconds([], first), ready=True)
 
 
 def names(cautions):
@@ -50,6 +51,13 @@ def test_films_of_under_three_seconds_tell_delays(tmp_path, cameras, seen):
     rig = open_rig(made_rig.write(tmp_path / "r", cameras, made_rig.shifted(seen, (0, 0, 2, 0), frames=28)), MASKS)
     assert (rig.count or 0) < delays.SECONDS * rig.rate
     assert names(said(rig)) == ["cam3 2.0 frames late"]
+
+
+def test_films_whose_first_seconds_are_all_of_them_are_not_read_again(tmp_path, cameras, seen, monkeypatch):
+    masks = made_rig.shifted(seen, (0, 0, 2, 0), frames=28)
+    monkeypatch.setattr(delays, "OPENING", 2.8)
+    monkeypatch.setattr(delays, "_middle", None)
+    assert names(said(open_rig(made_rig.write(tmp_path / "r", cameras, masks), MASKS), masks)) == ["cam3 2.0 frames late"]
 
 
 def test_a_long_film_is_read_near_its_beginning(rig_recording, monkeypatch):

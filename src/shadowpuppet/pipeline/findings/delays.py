@@ -10,6 +10,8 @@ from shadowpuppet.calibration.agreement import compare_cameras
 from shadowpuppet.calibration.silhouettes import Row, aligned_sets, silhouettes_of
 from shadowpuppet.calibration.time_offset import MIN_COMMON_SETS, certain_offsets, delays_in_words, time_offsets
 from shadowpuppet.errors import HARMFUL, Finding, ShadowPuppetWarning
+from shadowpuppet.pipeline.findings.look import FirstSeconds
+from shadowpuppet.pipeline.findings.opening import OPENING, opening_of
 from shadowpuppet.pipeline.footage import FIRST_SECONDS
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes
@@ -21,14 +23,18 @@ LEAST = 1.0
 """Frames by which a film must be late for the recording to be in doubt."""
 
 
-def delay_cautions(rig: Rig, silhouettes: Sequence[Silhouettes], ready: bool) -> list[Finding]:
+def delay_cautions(rig: Rig, silhouettes: Sequence[Silhouettes], first: FirstSeconds, ready: bool) -> list[Finding]:
     """A sentence on films that are certainly late or early by over a frame, with the remedy, if the cameras agree once that is mended; else
-    empty, as of films with too few frames, or people who move too little to tell. Several people are compared as one, by the outermost."""
+    empty, as of films with too few frames, or people who move too little to tell. Several people are compared as one, by the outermost.
+    Films are read again unless the `first` seconds are all of them."""
     if (rig.count or 0) <= MIN_COMMON_SETS:
         return []
     length = min((rig.count or 0) / rig.rate, SECONDS)
-    every = max(1, round(length * rig.rate / SETS))
-    rows = _middle(rig, silhouettes, length, every, ready)
+    if length > OPENING:
+        every = max(1, round(length * rig.rate / SETS))
+        rows = _middle(rig, silhouettes, length, every, ready)
+    else:
+        every, rows = opening_of(rig).every, [silhouettes_of(masks) for masks in first.masks]
     shifts = certain_offsets(time_offsets(rig.cameras, rows))
     late = {name: sets * every for name, sets in zip(rig.names, shifts) if abs(sets * every) > LEAST}
     if not late or compare_cameras(rig.cameras, aligned_sets(rows, shifts), remedies=False).wrong:

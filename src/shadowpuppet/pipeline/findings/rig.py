@@ -77,7 +77,7 @@ def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, fil
                    agreement=agree)
     recovered = frozenset(camera.name for camera, each in zip(look.cameras, silhouettes, strict=True) if each.recovered is not None)
     refusal = _rig_refusal(look, first) or (UNSEEN if rig.recording.several and recovered and not several else None)
-    late = [] if refusal or agree.remedy is not None else delay_cautions(rig, silhouettes, options.masks)
+    late = [] if refusal or agree.remedy is not None else delay_cautions(rig, silhouettes, first, options.masks)
     doubts = [*(late or _disagreements(agree, recovered)), *_rig_doubts(look, several > 0, recovered),
               *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     doubts += [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
