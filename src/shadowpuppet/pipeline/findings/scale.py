@@ -20,6 +20,7 @@ from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.height_estimation import DEVIATION
 from shadowpuppet.tracking.multiview.seen_stature import extents, hull_points, seen_stature
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
+from shadowpuppet.tracking.multiview.size_estimation import STATURE_DEVIATION
 
 PEOPLE = (0.9, 2.2)
 """Heights of people, metres, from children on."""
@@ -142,9 +143,10 @@ def judged(heights: Array, height: float | None) -> ScaleError | None:
     found, spread = float(np.median(np.log(heights))), float(np.log(heights).std(ddof=1))
     if low - spread < found < high + spread:
         return None
+    fitted = STATURE_DEVIATION / AVERAGE_HEIGHT  # alike in all moments: clothes, hair, shoes
     unknown = 0.0 if height is not None else DEVIATION / AVERAGE_HEIGHT
     return ScaleError(height=float(np.exp(found)), expected=height or AVERAGE_HEIGHT, is_known=height is not None,
-                      doubt=float(np.hypot(spread, unknown)))
+                      doubt=float(np.linalg.norm([spread, fitted, unknown])))
 
 
 def _limits(height: float | None) -> tuple[float, float]:
