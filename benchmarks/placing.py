@@ -18,12 +18,13 @@ import numpy as np
 import smallest
 from faults import into_page
 
+from shadowpuppet.calibration.silhouettes import aligned_sets
 from shadowpuppet.calibration.solve.tangency_bundle import ROUGH_FOCAL
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.geometry import Array, align, rigid, rotation_from_vector, unit, vector_from_rotation
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.progress import Listener
-from shadowpuppet.pipeline.repair.check import SilhouetteSets, aligned_sets, gather_silhouettes
+from shadowpuppet.pipeline.repair.check import SilhouetteSets, gather_silhouettes
 from shadowpuppet.pipeline.repair.placing import DOUBT_FACTOR, SETS, grounded, placed_in_step
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.synthetic import Gesture, Mannequin, Ring, Scene, Spec, synthesize

@@ -18,7 +18,7 @@ import smallest
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.pipeline.findings.scale import fitted_heights, judged, moments_of, stands
+from shadowpuppet.pipeline.findings.scale import few_of, fitted_heights, judged, moments_of, stands
 from shadowpuppet.synthetic import Mannequin, Ring, Scene, Spec
 from shadowpuppet.synthetic.movement.resting import PostureName
 from shadowpuppet.synthetic.person.clothes import Clothes
@@ -67,7 +67,7 @@ def row(spec: Spec) -> tuple[str, list[bool], list[bool]]:
     """The height found over the true one with its spread, and by factor whether the scale is named without and with the height."""
     cameras, masks = silhouettes(spec)
     settings, true = MultiviewSettings(), spec.body.stature
-    moments = moments_of(cameras, masks, settings)
+    moments = few_of(moments_of(cameras, masks, settings))
     heights = np.array([*fitted_heights(cameras, moments, settings)])
 
     def is_named(factor: float, height: float | None) -> bool:

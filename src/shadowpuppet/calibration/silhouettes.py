@@ -22,6 +22,8 @@ BORDER_MARGIN = 2
 """Distance from the picture's border, pixels, within which an outline may be the border's, not the person's."""
 MIN_CONTOUR_SHARE = 0.1
 """Contours shorter than this share of the longest are specks."""
+ALIGNED = 12
+"""Number of sets, spread over all, in which cameras are compared once their films are in step."""
 
 
 class Outline(NamedTuple):
@@ -91,3 +93,11 @@ def silhouettes_of(masks: Sequence[Mask | None]) -> list[Silhouette | None]:
 def outlines_of(cameras: Sequence[Camera], row: Row) -> list[Outline | None]:
     """The outlines of one set, by camera."""
     return [None if silhouette is None else silhouette.outline(camera) for camera, silhouette in zip(cameras, row)]
+
+
+def aligned_sets(rows: Sequence[Row], shifts: Sequence[float], count: int = ALIGNED) -> list[Row]:
+    """Some of the sets, evenly spread, in which camera k's silhouette is taken `shifts[k]` sets later."""
+    steps, F = [round(shift) for shift in shifts], len(rows)
+    first, last = max(0, -min(steps)), F - 1 - max(0, *steps)
+    chosen = np.unique(np.linspace(first, max(first, last), count).astype(int))
+    return [[rows[f + step][k] if f + step < F else None for k, step in enumerate(steps)] for f in chosen.tolist()]

@@ -70,6 +70,19 @@ def test_opencv_s_yaml_may_be_a_fisheye(tmp_path, key):
     np.testing.assert_allclose(camera.distortion, [-0.03, 0.004, -0.002, 0.0005])
 
 
+@pytest.mark.parametrize(("key", "words"), [("rotation_count: 1", "rotation_count: found 1"), ("distortion_kind: 2", "distortion_kind")])
+def test_a_key_that_is_no_camera_s_is_not_taken_for_one(tmp_path, key, words):
+    said(written(tmp_path, "a.yml", calibrations.opencv(MADE[0]).replace("flags: 0", key)), words, "may change where points are seen")
+
+
+def test_places_of_a_camera_without_a_lens_are_named(tmp_path):
+    calibrations.write_all(tmp_path, MADE)
+    path = tmp_path / "easy" / "extri.yml"
+    path.write_text(path.read_text() + calibrations._node("T_balcony", np.zeros((3, 1))))
+    with pytest.warns(ShadowPuppetWarning, match="stated there but not used: T_balcony"):
+        assert len(read_calibration(path)) == 3
+
+
 @pytest.mark.parametrize("key", ["fisheye_model: 0", "distortion_model: plumb_bob", "camera_model: pinhole"])
 def test_a_pinhole_may_be_named(tmp_path, key):
     assert not read_calibration(written(tmp_path, "a.yml", calibrations.opencv(MADE[0]).replace("flags: 0", key)))[0].fisheye

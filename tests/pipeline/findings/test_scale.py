@@ -37,18 +37,23 @@ def test_a_scale_is_wrong_beyond_the_heights_of_people_or_the_known_one_and_its_
     assert (judged(np.array(heights), height) is not None) is named
 
 
-def test_the_factor_has_the_doubt_of_moments_and_of_an_unknown_height():
+def test_the_factor_has_the_doubt_of_moments_of_the_fit_and_of_an_unknown_height():
     known, unknown = judged(np.array([2.4, 2.5, 2.6]), 1.75), judged(np.array([2.4, 2.5, 2.6]), None)
     assert known is not None
     assert unknown is not None
     assert known.factor == pytest.approx(2.5 / 1.75)
-    assert known.doubt == pytest.approx(0.04, abs=0.001)
+    assert known.doubt == pytest.approx(np.hypot(0.04, 0.035), abs=0.001)
+    alike = judged(np.array([2.54, 2.54, 2.54]), 1.75)  # of a ring that is 1.4 times too large
+    assert alike is not None
+    assert abs(alike.factor - 1.4) < 1.645 * alike.factor * alike.doubt
     assert unknown.doubt > known.doubt
     assert "2.50 m tall: the board's square?" in known.caution()
-    assert "1.43 ± 0.06 times too large" in known.caution()
+    assert "1.43 ± 0.08 times too large" in known.caution()
     assert "--height" in unknown.caution()
     assert "check --fix" in known.caution()
     assert known.caution().severity == RUINOUS
+    assert known.caution().evidence == {"height": known.height, "expected": 1.75, "factor": known.factor,
+                                        "within": known.factor * known.doubt}
     assert "too small, 0.57" in ScaleError(height=1.0, expected=1.75, is_known=True, doubt=0.02).caution()
 
 

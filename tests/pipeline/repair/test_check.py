@@ -98,10 +98,12 @@ def test_swapped_films_are_reported_and_no_time_is(recording, again, cameras):
     assert found.lateness is None
 
 
-def test_nobody_is_said(tmp_path, cameras):
+@pytest.mark.parametrize(("options", "words"), [(MASKS, "the masks of no two cameras show a person"),
+                                                (Options(), "no two cameras see a person.*do the films belong")])  # fmt: skip
+def test_nobody_is_said_of_masks_and_of_films(tmp_path, cameras, options, words):
     folder = made_rig.write(tmp_path / "r", cameras, [[np.zeros(camera.size[::-1], bool) for camera in cameras]] * 4)
-    with pytest.raises(RecordingError, match="no two cameras see a person"):
-        checked(folder)
+    with pytest.raises(RecordingError, match=words):
+        checked(folder, options)
 
 
 def test_check_as_a_user_types_it(recording, again, cameras, capsys, tmp_path):

@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 
 from shadowpuppet.calibration.agreement import MAX_DISAGREEMENT
+from shadowpuppet.calibration.silhouettes import ALIGNED, aligned_sets
 from shadowpuppet.calibration.time_offset import TimeOffsets, certain_offsets
 from shadowpuppet.pipeline.repair import check as judging
 from shadowpuppet.pipeline.repair.check import (
-    SETS_COMPARED,
     RotationFix,
     _directions,
     _in_frames,
     _standing_out,
     _starts,
-    aligned_sets,
     doubts_of,
 )
 
@@ -36,7 +35,7 @@ def test_sets_are_spread_over_all_that_every_camera_has(shifts):
     begins = [row[3][0] for row in found]
     assert begins[0] == -min(steps)
     assert begins[-1] == 39 - max(steps)
-    assert len(found) == SETS_COMPARED
+    assert len(found) == ALIGNED
     assert np.ptp(np.diff(begins)) <= 1
     assert all(row == [(begin + step, camera) for camera, step in enumerate(steps)] for row, begin in zip(found, begins))
 

@@ -89,11 +89,12 @@ def _drafts(path: Path, values: dict[str, Any], alone: str) -> Drafts:
         if is_mc_calib(values):
             return read_mc_calib(values)
         jarvis, fisheye, unit = is_jarvis(values), is_fisheye("", values), stated_unit("", [values])
-        unused = tuple(unknown_keys("", values, (*PATTERNS.values(), IGNORED, LENS_KEYS, UNIT_KEYS)))
+        cameras = _grouped(untransposed(values) if jarvis else values)
+        lenses = {end: parts for end, parts in cameras.items() if "matrix" in parts}
+        theirs = [key for key, value in values.items() if (found := _parameter(key, value)) is not None and found[0] in ("", *lenses)]
+        unused = tuple(unknown_keys("", values, (*theirs, IGNORED, LENS_KEYS, UNIT_KEYS)))
     except CalibrationError as error:
         raise CalibrationError(f"{path}: {error}") from None
-    cameras = _grouped(untransposed(values) if jarvis else values)
-    lenses = {end: parts for end, parts in cameras.items() if "matrix" in parts}
     if not lenses:
         raise CalibrationError(f"{path}: no camera matrix in it, expected camera_matrix, or K_<camera> for each; found "
                                f"{choices(values)[:200]}")
@@ -120,12 +121,18 @@ def _grouped(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
     for key, value in values.items():
         if value is None or (key in ("R1", "R2") and "P1" in values):  # stereoRectify's, which are no extrinsics
             continue
-        for kind, pattern in PATTERNS.items():
-            match = pattern.fullmatch(key)
-            if match is not None and (kind not in ("width", "height") or isinstance(value, float)):
-                cameras.setdefault(match[2] or match[3] or "", {}).setdefault(kind, value)
-                break
+        if (found := _parameter(key, value)) is not None:
+            cameras.setdefault(found[0], {}).setdefault(found[1], value)
     return cameras
+
+
+def _parameter(key: str, value: object) -> tuple[str, str] | None:
+    """The camera's ending and the kind (of `STEMS`) of the parameter that a key names; None if it names none."""
+    for kind, pattern in PATTERNS.items():
+        match = pattern.fullmatch(key)
+        if match is not None and (kind not in ("width", "height") or isinstance(value, float)):
+            return match[2] or match[3] or "", kind
+    return None
 
 
 def _draft(path: Path, name: str, parts: dict[str, Any], fisheye: bool) -> Draft:

@@ -77,14 +77,15 @@ def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, fil
                    agreement=agree)
     recovered = frozenset(camera.name for camera, each in zip(look.cameras, silhouettes, strict=True) if each.recovered is not None)
     refusal = _rig_refusal(look, first) or (UNSEEN if rig.recording.several and recovered and not several else None)
-    doubts = [*_rig_doubts(look, several > 0, recovered), *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
+    late = [] if refusal or agree.remedy is not None else delay_cautions(rig, silhouettes, first, options.masks)
+    doubts = [*(late or _disagreements(agree, recovered)), *_rig_doubts(look, several > 0, recovered),
+              *recovery_cautions([camera.name for camera in look.cameras], silhouettes)]
     doubts += [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
-    if not (refusal or several or agree.doubts()):
-        doubts += delay_cautions(rig, silhouettes, options.masks)
     if not refusal:
-        moments = moments_of(rig.cameras, first.masks, options.multiview)  # also of several people: a wrong scale makes two of one
-        scale = error_in(rig, moments, options)
-        found = (None if scale is None else scale.caution(), None if several else up_caution(rig.cameras, moments, options.multiview))
+        # also of several people: a wrong scale makes two of one
+        scale = error_in(rig, moments_of(rig.cameras, first.masks, options.multiview), options)
+        walk = [] if several else moments_of(rig.cameras, [seen.masks for seen in spread], options.multiview)
+        found = (None if scale is None else scale.caution(), up_caution(rig.cameras, walk, options.multiview))
         doubts = [each for each in found if each is not None] + doubts
     if several and options.people != 1:
         doubts.insert(0, Finding.of("{people} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
@@ -171,13 +172,16 @@ def _odd(rates: Array, look: RigLook) -> str:
     return f"camera {odd[0]!r} is" if len(odd) == 1 else f"cameras {', '.join(odd[:3])} are"
 
 
+def _disagreements(found: Agreement, recovered: frozenset[str]) -> list[Finding]:
+    """Doubts about the cameras' agreement. Silhouettes against an empty scene that was `recovered` from the films of these cameras may
+    themselves be why the cameras do not fit together."""
+    unclear = bool(recovered) and found.remedy is None
+    return [replace(doubt, short=SILHOUETTES_OR_CAMERAS) if unclear and doubt.severity == RUINOUS else doubt for doubt in found.doubts()]
+
+
 def _rig_doubts(look: RigLook, several: bool = False, recovered: frozenset[str] = frozenset()) -> list[Finding]:
-    """Doubts about a rig; of `several` people the quality of silhouettes, which supposes one, says nothing; silhouettes against an empty
-    scene that was `recovered` from the films of these cameras may themselves be why the cameras do not fit together."""
-    unclear = bool(recovered) and look.agreement.remedy is None
-    doubts = [replace(doubt, short=SILHOUETTES_OR_CAMERAS) if unclear and doubt.severity == RUINOUS else doubt
-              for doubt in look.agreement.doubts()]
-    rates = np.array([camera.rate for camera in look.cameras])
+    """Doubts about the films of a rig; of `several` people the quality of silhouettes, which supposes one, says nothing."""
+    doubts, rates = list[Finding](), np.array([camera.rate for camera in look.cameras])
     ends = {camera.name: camera.frames / camera.rate for camera in look.cameras if camera.frames is not None}
     if np.ptp(rates) > RATES * rates.min():
         listed = ", ".join(f"{camera.name} {camera.rate:.4g}" for camera in look.cameras)

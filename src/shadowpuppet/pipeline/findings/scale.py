@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 
@@ -18,8 +18,9 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.tracking.multiview.height_estimation import DEVIATION
-from shadowpuppet.tracking.multiview.seen_stature import hull_extents, seen_stature
+from shadowpuppet.tracking.multiview.seen_stature import extents, hull_points, seen_stature
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
+from shadowpuppet.tracking.multiview.size_estimation import STATURE_DEVIATION
 
 PEOPLE = (0.9, 2.2)
 """Heights of people, metres, from children on."""
@@ -51,22 +52,34 @@ class ScaleError:
 
     def caution(self) -> Finding:
         """The error and its remedy."""
-        within = f"{self.factor:.2f} ± {self.factor * self.doubt:.2f}"
-        usual = f"the {self.expected:.2f} m that are given" if self.is_known else f"the {self.expected:.2f} m of most people"
+        usual = "the {expected:.2f} m that are given" if self.is_known else "the {expected:.2f} m of most people"
         remedy = ("`shadowpuppet check --fix` divides every translation by that" if self.is_known else
                   "give the person's --height, and `shadowpuppet check --fix` mends it")
-        off = f"{within} times too large" if self.factor > 1 else f"too small, {within} times what they should be"
-        return Finding(f"the calibration makes the person {self.height:.2f} m tall: the board's square? All lengths are {off} by {usual}; "
-                       f"measure the square and calibrate again, or {remedy}",
-                       f"calibration's scale is wrong, {self.factor:.2f} times: the board's square?", RUINOUS)
+        off = "{factor:.2f} ± {within:.2f}"
+        off = f"{off} times too large" if self.factor > 1 else f"too small, {off} times what they should be"
+        return Finding.of(f"the calibration makes the person {{height:.2f}} m tall: the board's square? All lengths are {off} by {usual}; "
+                          f"measure the square and calibrate again, or {remedy}",
+                          "calibration's scale is wrong, {factor:.2f} times: the board's square?", RUINOUS,
+                          height=self.height, expected=self.expected, factor=self.factor, within=self.factor * self.doubt)
 
 
-class Moment(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Moment:
     """What one moment shows of a whole person."""
 
     masks: tuple[Mask | None, ...]
-    extents: Array
-    """Of the hull, (3,), metres, the longest first."""
+    points: Array
+    """Surface points of the hull, (P, 3), metres."""
+
+    @cached_property
+    def extents(self) -> Array:
+        """Of the hull, (3,), metres, the longest first."""
+        return extents(self.points)
+
+    @property
+    def is_slender(self) -> bool:
+        """Whether the person stands or lies, arms at the sides or raised."""
+        return is_slender(self.extents)
 
 
 def error_in(rig: Rig, moments: Sequence[Moment], options: Options) -> ScaleError | None:
@@ -82,6 +95,7 @@ def scale_error(cameras: Sequence[Camera], moments: Sequence[Moment], settings: 
 
     Hulls of a person who stands tell at once that a scale is right. A body is fitted where they do not: of people who sit, or reach aside.
     """
+    moments = few_of(moments)
     if stands([moment.extents for moment in moments], height):
         return None
     (low, high), heights = _limits(height), list[float]()
@@ -93,9 +107,13 @@ def scale_error(cameras: Sequence[Camera], moments: Sequence[Moment], settings: 
 
 
 def moments_of(cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]], settings: MultiviewSettings) -> list[Moment]:
-    """`FRAMES` moments at most, spread over `views`, masks (H, W) by time and camera, in which at least two cameras see a whole person."""
-    whole = [moment for n in evenly_spread(len(views), SETS_COMPARED) if views for moment in _moment(cameras, views[n], settings)]
-    return [whole[n] for n in evenly_spread(len(whole), FRAMES) if whole]
+    """Moments, spread over `views`, masks (H, W) by time and camera, in which at least two cameras see a whole person."""
+    return [moment for n in evenly_spread(len(views), SETS_COMPARED) if views for moment in _moment(cameras, views[n], settings)]
+
+
+def few_of(moments: Sequence[Moment]) -> list[Moment]:
+    """`FRAMES` of the moments at most, evenly spread."""
+    return [moments[n] for n in evenly_spread(len(moments), FRAMES) if moments]
 
 
 def stands(extents: Sequence[Array], height: float | None) -> bool:
@@ -125,9 +143,10 @@ def judged(heights: Array, height: float | None) -> ScaleError | None:
     found, spread = float(np.median(np.log(heights))), float(np.log(heights).std(ddof=1))
     if low - spread < found < high + spread:
         return None
+    fitted = STATURE_DEVIATION / AVERAGE_HEIGHT  # alike in all moments: clothes, hair, shoes
     unknown = 0.0 if height is not None else DEVIATION / AVERAGE_HEIGHT
     return ScaleError(height=float(np.exp(found)), expected=height or AVERAGE_HEIGHT, is_known=height is not None,
-                      doubt=float(np.hypot(spread, unknown)))
+                      doubt=float(np.linalg.norm([spread, fitted, unknown])))
 
 
 def _limits(height: float | None) -> tuple[float, float]:
@@ -138,8 +157,8 @@ def _limits(height: float | None) -> tuple[float, float]:
 def _moment(cameras: Sequence[Camera], masks: Sequence[Mask | None], settings: MultiviewSettings) -> list[Moment]:
     """A moment, if at least two cameras see a whole person: what reaches the picture's border may be cut off."""
     whole = tuple(None if mask is None or not may_be_person(mask) else _whole(mask) for mask in masks)
-    found = hull_extents(cameras, whole, settings.hull) if sum(mask is not None for mask in whole) > 1 else np.zeros(3)
-    return [Moment(whole, found)] if found[0] else []
+    points = hull_points(cameras, whole, settings.hull) if sum(mask is not None for mask in whole) > 1 else np.zeros((0, 3))
+    return [Moment(whole, points)] if len(points) else []
 
 
 def _whole(mask: Mask) -> Mask | None:

@@ -13,7 +13,7 @@ import numpy as np
 from shadowpuppet.calibration.agreement import MAX_DISAGREEMENT, Agreement, compare_cameras
 from shadowpuppet.calibration.clock_offset import ClockOffsets
 from shadowpuppet.calibration.rotation_error import RotationError, estimate_place_error, estimate_rotation_error
-from shadowpuppet.calibration.silhouettes import Row, silhouettes_of
+from shadowpuppet.calibration.silhouettes import Row, aligned_sets, silhouettes_of
 from shadowpuppet.calibration.time_offset import TimeOffsets, certain_offsets, delays_in_words, time_offsets
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning
 from shadowpuppet.pipeline.findings.film import brief_length
@@ -29,8 +29,6 @@ SETS, MIN_SETS, MAX_SETS_READ = 240, 120, 3000
 """Number of sets of silhouettes compared; their least number if the films are long enough; the greatest number of sets read."""
 MAX_SET_RATE = 31.0
 """Greatest rate of the sets compared, 1/s; a higher one adds nothing."""
-SETS_COMPARED = 12
-"""Number of sets, spread over all, in which places are compared."""
 SAME_PIXELS = 0.1
 """Mean disagreement, pixels, by which films put in step may be worse: silhouettes of a person who hardly moves are as much alike."""
 SLIGHT_DISAGREEMENT = 0.004
@@ -133,10 +131,13 @@ def _silhouettes(footage: Footage, options: Options, steps: Steps) -> Silhouette
     return found
 
 
-def judge_calibration(rig: Rig, sets: SilhouetteSets) -> CalibrationCheck:
-    """Test the calibration of `rig` against silhouettes. Raises `RecordingError` if no two cameras see a person at the same time."""
+def judge_calibration(rig: Rig, sets: SilhouetteSets, ready: bool = False) -> CalibrationCheck:
+    """Test the calibration of `rig` against silhouettes, made or `ready`. Raises `RecordingError` if no two cameras see a person at the
+    same time."""
     if sum(sum(silhouette is not None for silhouette in row) > 1 for row in sets.rows) < 2:
-        raise RecordingError(f"{rig.recording.path}: no two cameras see a person at the same time: do the films belong together?")
+        seen, asked = (("the masks of no two cameras show", "is mask n of each camera frame n of its film, and do they hold the person?")
+                       if ready else ("no two cameras see", "do the films belong together?"))
+        raise RecordingError(f"{rig.recording.path}: {seen} a person at the same time: {asked}")
     found = _judged(rig, sets.rows)
     offsets = None if found.offsets is None else _in_frames(found.offsets, sets.every)
     check = CalibrationCheck(
@@ -184,14 +185,6 @@ def _with_times(rig: Rig, rows: Sequence[Row], found: Agreement, chosen: Sequenc
     cameras = [rotations[camera.name].turn.of(camera) if camera.name in rotations else camera for camera in rig.cameras]
     offsets = time_offsets(cameras, rows)
     return _Judgement(found, rotations, offsets, certain_offsets(offsets, found.wrong))
-
-
-def aligned_sets(rows: Sequence[Row], shifts: Sequence[float], count: int = SETS_COMPARED) -> list[Row]:
-    """Some of the sets, evenly spread, in which camera k's silhouette is taken `shifts[k]` sets later."""
-    steps, F = [round(shift) for shift in shifts], len(rows)
-    first, last = max(0, -min(steps)), F - 1 - max(0, *steps)
-    chosen = np.unique(np.linspace(first, max(first, last), count).astype(int))
-    return [[rows[f + step][k] if f + step < F else None for k, step in enumerate(steps)] for f in chosen.tolist()]
 
 
 def _rotations(rig: Rig, found: Agreement, rows: Sequence[Row]) -> dict[str, RotationFix]:

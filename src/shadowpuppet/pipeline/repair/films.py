@@ -67,13 +67,13 @@ def _in_step(rig: Rig, options: Options, listener: Listener) -> Checked:
     listener.begin("reading the films' clocks")
     clock = clock_offsets(rig)
     listener.begin("comparing")
-    check = replace(judge_calibration(rig, sets), clock=clock)
+    check = replace(judge_calibration(rig, sets, options.masks), clock=clock)
     if clock is None or not _differs(clock, check):
         return Checked(check, sets, sets)
     moved = in_step(rig, clock.seconds)
     again = gather_silhouettes(moved, options, listener)
     listener.begin("comparing")
-    other = judge_calibration(moved, again)
+    other = judge_calibration(moved, again, options.masks)
     if _mean_disagreement(other) > _mean_disagreement(check) + (SAME_PIXELS if check.still else 0.0):
         return Checked(replace(check, doubts=(*check.doubts, DISAGREE[clock.by])), sets, sets)
     return Checked(_by_clock(rig, moved, other, clock), again, sets)

@@ -11,9 +11,9 @@ import tomli_w
 
 from shadowpuppet.calibration.agreement import compare_cameras
 from shadowpuppet.calibration.results import keep_old, replace_calibration
+from shadowpuppet.calibration.silhouettes import aligned_sets
 from shadowpuppet.errors import RecordingError, reason
 from shadowpuppet.io.files.text import read_toml, write_whole
-from shadowpuppet.pipeline.repair.check import aligned_sets
 from shadowpuppet.pipeline.repair.films import Checked
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.tracking.multiview.seen_stature import scaled

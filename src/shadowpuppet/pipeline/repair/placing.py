@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.calibration.results import replace_calibration
-from shadowpuppet.calibration.silhouettes import Row
+from shadowpuppet.calibration.silhouettes import Row, aligned_sets
 from shadowpuppet.calibration.solve.tangency_bundle import ROUGH_FOCAL, TangencyFit, place_by_outlines
 from shadowpuppet.calibration.time_offset import time_offsets
 from shadowpuppet.camera.camera import Camera
@@ -20,7 +20,7 @@ from shadowpuppet.io.calibration.rough import ROUGH_NAME
 from shadowpuppet.io.recording import UncalibratedError
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener
-from shadowpuppet.pipeline.repair.check import SilhouetteSets, aligned_sets, gather_silhouettes
+from shadowpuppet.pipeline.repair.check import SilhouetteSets, gather_silhouettes
 from shadowpuppet.pipeline.repair.clocks import clock_offsets, in_step
 from shadowpuppet.pipeline.repair.fix import write_notes
 from shadowpuppet.pipeline.rig import Rig, open_rig

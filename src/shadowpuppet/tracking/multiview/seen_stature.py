@@ -70,16 +70,16 @@ def extents(points: Array) -> Array:
     return np.sort(along[-1 - STRAY] - along[STRAY])[::-1]
 
 
-def hull_extents(cameras: Sequence[Camera], masks: Sequence[Mask | None], settings: HullSettings) -> Array:
-    """Extents (3,), metres, of the hull of masks (H, W), as `extents`. The settings' lengths are for a person: all of the hull tells the
-    size first."""
-    found, factor = np.zeros(3), 1.0
+def hull_points(cameras: Sequence[Camera], masks: Sequence[Mask | None], settings: HullSettings) -> Array:
+    """Surface points (P, 3), metres, of the hull of masks (H, W), as `person_points`; none of too few. The settings' lengths are for a
+    person: all of the hull tells the size first."""
+    points, factor = np.zeros((0, 3)), 1.0
     for hull in (replace(settings, longest=ANY), settings):
-        found = extents(person_points([scaled(camera, factor) for camera in cameras], masks, hull).points) / factor
-        if not found[0]:
-            break
-        factor = EXTENT / float(found[0])
-    return found
+        points = person_points([scaled(camera, factor) for camera in cameras], masks, hull).points / factor
+        if not (longest := float(extents(points)[0])):
+            return np.zeros((0, 3))
+        factor = EXTENT / longest
+    return points
 
 
 def person_points(cameras: Sequence[Camera], masks: Sequence[Mask | None], settings: HullSettings) -> SurfacePoints:
@@ -104,7 +104,7 @@ def seen_stature(rng: np.random.Generator, cameras: Sequence[Camera], masks: Seq
                  settings: MultiviewSettings) -> SeenStature | None:
     """The height that masks (H, W) of one moment, by camera, that show the whole person ask for; None if no body fits them. It grows with
     the cameras' world in proportion: nothing else depends on the world's scale."""
-    longest = hull_extents(cameras, masks, settings.hull)[0]
+    longest = extents(hull_points(cameras, masks, settings.hull))[0]
     if not longest:
         return None
     plain, make = replace(settings, method="hybrid", refinement="gauss_newton"), _maker(settings.body)
