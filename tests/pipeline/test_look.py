@@ -11,19 +11,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.errors import HARMFUL, NOTED, RecordingError, SettingsError, ShadowPuppetError, SilhouetteError, TrackingError
+from shadowpuppet.errors import HARMFUL, NOTED, RecordingError, SettingsError, ShadowPuppetError, SilhouetteError
 from shadowpuppet.io.recording import Subject
 from shadowpuppet.pipeline.findings.camera import _doubts as camera_doubts
 from shadowpuppet.pipeline.findings.camera import _look, survey_camera
 from shadowpuppet.pipeline.findings.cautions import recovery_cautions
 from shadowpuppet.pipeline.findings.film import quality_of, survey_film
+from shadowpuppet.pipeline.findings.verdict import verdict_of_look
 from shadowpuppet.pipeline.footage import FIRST, FIRST_SECONDS, LOOKED_AT, RUN, RUNS, _spread, open_footage, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person import DEEP, _doubts, _forearms_seen, wrong_posture
 from shadowpuppet.pipeline.prepare import MONOCULAR, Prepared, look_at, prepare
 from shadowpuppet.pipeline.rig import open_rig
-from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes, read_masks
-from shadowpuppet.pipeline.track import json_text, track_recording
+from shadowpuppet.pipeline.silhouettes import Silhouettes, clean_silhouettes, learn_silhouettes
+from shadowpuppet.pipeline.track import json_text
 from shadowpuppet.silhouette import RecoveredScene, Segmenter
 from shadowpuppet.silhouette.quality import mask_quality
 from shadowpuppet.synthetic import synthesize
@@ -122,25 +123,6 @@ def test_masks_black_on_white_are_the_same_as_white_on_black(recording, tmp_path
     right, found = (look_at(each, Options(masks=True)) for each in (recording, other))
     assert found.background == "masks/cam.mkv, ready silhouettes, black on white"
     assert (found.quality, found.person) == (right.quality, right.person)
-
-
-@pytest.mark.parametrize(("kind", "colour", "lossless"), [("masks", 255, True), ("video", (0, 0, 255), False)])
-def test_a_cable_is_left_out_of_the_silhouettes_and_said(recording, tmp_path, kind, colour, lossless):
-    spoilt = made.copied(recording, tmp_path / "cable")
-    path = spoilt / kind / ("cam.mkv" if lossless else "cam.mp4")
-    images = [image.copy() for image in made.images(path)]
-    x = made.SIZE[0] // 2 + 12
-    for image in images:
-        image[:, x : x + 2] = colour
-    made.write_film(path, images, lossless=lossless)
-    look = look_at(spoilt, Options(masks=kind == "masks"))
-    assert look.left_out
-    assert all(told.startswith("a thin upright line at x = ") for told in look.left_out)
-    assert sum("taken for clutter, not for the person, and left out of the silhouettes" in doubt for doubt in look.doubts) == 1
-    assert look.person["start_overlap"] > 0.8
-    footage = open_footage(spoilt, Options(masks=kind == "masks"))
-    above = [mask[: made.SIZE[1] // 12].sum() for mask in read_masks(footage, Options(masks=kind == "masks"))]
-    assert max(above) == 0
 
 
 def prepared(recording, options) -> Prepared:
@@ -262,11 +244,15 @@ def test_uneven_times_are_said(recording, tmp_path):
 # Refusals
 
 
-def test_a_film_in_another_light_than_its_background_is_refused(recording, tmp_path):
+def test_a_film_that_does_not_show_its_background_is_bad_and_says_why(recording, tmp_path):
     other = made.copied(recording, tmp_path / "other")
     made.write_film(other / "video" / "cam.mp4", [255 - image for image in made.images(recording / "video" / "cam.mp4")])
-    with pytest.raises(TrackingError, match=r"give a background of the same light|the light changed"):
-        track_recording(other, tmp_path / "run")
+    with pytest.raises(RecordingError, match=r"side_arms_hanging\.png: the silhouette is empty"):
+        look_at(other)
+    (other / "references").rename(tmp_path / "references")
+    verdict = verdict_of_look(look_at(other))
+    assert verdict.word == "bad"
+    assert any("the empty scene is another place's: film it again" in reason for reason in verdict.reasons)
 
 
 def test_references_in_another_posture_are_refused(recording, tmp_path):

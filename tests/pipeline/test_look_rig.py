@@ -295,7 +295,7 @@ def test_a_cable_before_one_camera_accuses_none(recording, tmp_path):
     made.write_film(spoilt / "masks" / f"{name}.mkv", images, lossless=True)
     look = looked(spoilt)
     assert look.agreement.wrong == ()
-    assert [camera.name for camera in look.cameras if camera.left_out] == [name]
+    assert [camera.name for camera in look.cameras if camera.added] == [name]
     assert any(doubt.startswith(f"camera {name!r}: a thin upright line at x = 31") for doubt in look.doubts)
 
 

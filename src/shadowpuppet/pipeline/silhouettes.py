@@ -13,7 +13,6 @@ from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, spread_f
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.silhouette import RecoveredScene, Segmenter, SilhouetteSettings, learn_background, ready_mask, recover_scene
 from shadowpuppet.silhouette.added import AddedParts, StillParts, find_still
-from shadowpuppet.silhouette.clutter import Clutter, find_clutter
 from shadowpuppet.silhouette.segmenter import Labelled, Segmented
 from shadowpuppet.video import Image
 
@@ -28,8 +27,6 @@ class Silhouettes:
     """Segments the person from the background; None for ready silhouettes."""
     region: tuple[slice, slice] | None = None
     """Rows and columns outside which masks are empty; None for all."""
-    clutter: Clutter | None = None
-    """What is left out of every mask, because it is not the person."""
     recovered: RecoveredScene | None = None
     """The empty scene if it was recovered from the film."""
     added: AddedParts | None = None
@@ -77,12 +74,6 @@ class Silhouettes:
         correction = self.segmenter.correction
         return find_still([frame.image if correction is None else correction(frame.image).image for frame in frames], masks)
 
-    def without_clutter(self, masks: Sequence[Mask]) -> Silhouettes:
-        """A copy that leaves out the clutter in `masks` (H, W), which these silhouettes made of a sample of the film; itself if there is
-        none."""
-        clutter = find_clutter(masks)
-        return self if clutter is None else replace(self, clutter=clutter)
-
     def plain(self, frame: CameraFrame) -> Mask | None:
         """The mask (H, W) by eq. 1 alone; None if the background has no standard deviation."""
         if self.segmenter is None or self.segmenter.background.frames < 2:
@@ -98,14 +89,10 @@ class Silhouettes:
         return image if movement is None else correction.registration.undone(image, movement)[0]
 
     def _kept(self, found: Segmented) -> Segmented:
-        """A silhouette within the region, without clutter."""
+        """A silhouette within the region."""
         again = found.with_limbs
-        return Segmented(self._person(found.mask), found.shadow, None if again is None else lambda limbs: self._person(again(limbs)),
+        return Segmented(self._within(found.mask), found.shadow, None if again is None else lambda limbs: self._within(again(limbs)),
                          found.image)
-
-    def _person(self, mask: Mask) -> Mask:
-        mask = self._within(mask)
-        return mask if self.clutter is None else self.clutter.removed(mask)
 
     def _within(self, mask: Mask) -> Mask:
         if self.region is None:
@@ -152,15 +139,8 @@ def _recovered(footage: Footage, sampled: list[Image]) -> RecoveredScene:
 def read_masks(footage: Footage, options: Options) -> Iterator[Mask]:
     """Masks (H, W) of the film's frames, one after another, as `track_recording` makes them. Raises `SilhouetteError` or
     `SettingsError`."""
-    silhouettes = uncluttered_silhouettes(footage, take_sample(footage, options.masks), options)
-    segment = silhouettes.segmented
+    segment = learn_silhouettes(footage, take_sample(footage, options.masks), options).segmented
     return (segment(frame).mask for frame in footage.frames(ready=options.masks))
-
-
-def uncluttered_silhouettes(footage: Footage, sample: Sample, options: Options) -> Silhouettes:
-    """`learn_silhouettes` without the clutter in the sample's frames."""
-    silhouettes = learn_silhouettes(footage, sample, options)
-    return silhouettes.without_clutter([silhouettes(frame) for frame in sample.frames])
 
 
 def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, options: Options) -> Silhouettes:
@@ -171,8 +151,7 @@ def clean_silhouettes(footage: Footage, sample: Sample, tracked: Silhouettes, op
     clean = clean_settings(options.silhouette)
     if tracked.segmenter is None or clean == options.silhouette:
         return tracked
-    clean_ones = learn_silhouettes(footage, sample, replace(options, silhouette=clean), tracked.recovered, tracked.added)
-    return replace(clean_ones, clutter=tracked.clutter)
+    return learn_silhouettes(footage, sample, replace(options, silhouette=clean), tracked.recovered, tracked.added)
 
 
 def clean_settings(asked: SilhouetteSettings) -> SilhouetteSettings:

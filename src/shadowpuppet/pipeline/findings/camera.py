@@ -13,7 +13,7 @@ from shadowpuppet.body.models import WHOLE
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.errors import HARMFUL, NOTED, Finding
 from shadowpuppet.pipeline.findings.cautions import (
-    clutter_cautions,
+    added_cautions,
     condition_cautions,
     feet_cautions,
     film_cautions,
@@ -82,7 +82,7 @@ def _look(footage: Footage, film: FilmSurvey, options: Options) -> Look:
                else sitting_cautions(film.masks, [frame.time for frame in sample.frames]))
     several = _several_people(film, HARMFUL if options.people is None else NOTED)
     doubts = (*several, *posture, *_doubts(look, footage), *film_cautions(footage),
-              *recovery_cautions([camera.name], [film.silhouettes]), *clutter_cautions(look.left_out))
+              *recovery_cautions([camera.name], [film.silhouettes]), *added_cautions(look.added))
     return replace(look, findings=(*doubts, *look.quality.warnings()))
 
 

@@ -24,12 +24,12 @@ LOWER, SMALLER, OFTEN = 0.25, 0.75, 0.1
 where they sit; and the least share of such frames. Who bows keeps the area, who turns the height."""
 
 
-def clutter_cautions(left_out: Sequence[str]) -> list[Finding]:
-    """What was left out of the silhouettes as clutter; nothing if nothing was."""
-    if not left_out:
+def added_cautions(added: str | None) -> list[Finding]:
+    """What was added to the empty scene, and left out of the silhouettes; nothing if nothing was."""
+    if added is None:
         return []
-    return [Finding.of("{parts}: taken for clutter, not for the person, and left out of the silhouettes",
-                       "clutter beside the person was left out: see the overlay", NOTED, parts="; ".join(left_out))]
+    return [Finding.of("{added}: it is left out of the silhouettes", "something beside the person was left out: see the overlay", NOTED,
+                       added=added)]
 
 
 def recovery_doubt(silhouettes: Silhouettes) -> str | None:

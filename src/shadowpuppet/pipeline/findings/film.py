@@ -49,8 +49,7 @@ def look_again(footage: Footage, film: FilmSurvey, options: Options, beside: Bes
     """The survey of a film in which what never moves, and a fitted body leaves `beside` it, belongs to the scene; the same one if there is
     nothing. The film is not read again."""
     steps("judging masks", footage.camera.name)
-    bare = replace(film.silhouettes, clutter=None)
-    made = _with_added(footage, film.sample, bare, film.runs, options, beside)
+    made = _with_added(footage, film.sample, film.silhouettes, film.runs, options, beside)
     steps("", footage.camera.name)
     return film if made is None else _judged(footage, film.sample, *made)
 
@@ -115,28 +114,23 @@ def _with_added(footage: Footage, sample: Sample, silhouettes: Silhouettes, runs
 
 def _judged(footage: Footage, sample: Sample, silhouettes: Silhouettes, runs: list[list[Mask]]) -> FilmSurvey:
     """What silhouettes and their masks of the sample's runs say of a film."""
-    silhouettes = silhouettes.without_clutter([mask for run in runs for mask in run])
-    clutter = silhouettes.clutter
-    clear = runs if clutter is None else [[clutter.removed(mask) for mask in run] for run in runs]
-    masks = [mask for run in clear for mask in run]
+    masks = [mask for run in runs for mask in run]
     exact = [ready_mask(frame.ready) for frame in sample.frames if frame.ready is not None and silhouettes.segmenter is not None]
     camera = footage.camera
     look = FilmLook(
         size=footage.view.camera.size, worked_size=camera.size, background=silhouettes.source,
         fov=float(np.degrees(2 * np.arctan(camera.size[0] / 2 / camera.matrix[0, 0]))), frames=footage.count, rate=1 / sample.pace,
         key="none" if silhouettes.segmenter is None else silhouettes.segmenter.reason, exact_overlap=mean_overlap(masks, exact),
-        quality=quality_of(clear, sample.starts, silhouettes.segmenter is None), left_out=_left_out(silhouettes, footage),
-        condition=condition_of(silhouettes, sample, clear),
+        quality=quality_of(runs, sample.starts, silhouettes.segmenter is None), added=_added(silhouettes, footage),
+        condition=condition_of(silhouettes, sample, runs),
     )  # fmt: skip
-    return FilmSurvey(sample, silhouettes, runs, masks, exact, look)
+    return FilmSurvey(sample, silhouettes, runs, exact, look)
 
 
-def _left_out(silhouettes: Silhouettes, footage: Footage) -> tuple[str, ...]:
-    """What is left out of the silhouettes, in words and the film's pixels."""
-    parts = silhouettes.clutter.parts if silhouettes.clutter is not None else ()
-    parts = parts if silhouettes.added is None else (*parts, silhouettes.added)
+def _added(silhouettes: Silhouettes, footage: Footage) -> str | None:
+    """What was added to the empty scene, in words and the film's pixels; None for nothing."""
     (width, height), full = footage.camera.size, footage.view.camera.size
-    return tuple(part.described((full[0] / width, full[1] / height)) for part in parts)
+    return None if silhouettes.added is None else silhouettes.added.described((full[0] / width, full[1] / height))
 
 
 def brief_length(footage: Footage, options: Options) -> int:

@@ -42,8 +42,8 @@ class FilmLook:
     """Overlap (intersection over union) with the recording's ready silhouettes; None without these."""
     quality: MaskQuality
     """Quality of the silhouettes in the sampled frames."""
-    left_out: tuple[str, ...] = ()
-    """Parts of the silhouettes that are left out because they are not the person, in words and the film's pixels."""
+    added: str | None = None
+    """What was added to the empty scene and is left out of the silhouettes, in words and the film's pixels; None for nothing."""
     condition: FilmCondition | None = None
     """Noise, light and movement of the film in the sampled frames; None for ready silhouettes."""
 
@@ -122,12 +122,15 @@ class FilmSurvey(NamedTuple):
     sample: Sample
     silhouettes: Silhouettes
     runs: list[list[Mask]]
-    """Silhouettes of the sample's runs, with the clutter."""
-    masks: list[Mask]
-    """Silhouettes of the sample's frames, without clutter."""
+    """Silhouettes of the sample's runs."""
     exact: list[Mask]
     """The recording's ready silhouettes of the same frames; empty if there are none, or if `silhouettes` are these."""
     look: FilmLook
+
+    @property
+    def masks(self) -> list[Mask]:
+        """Silhouettes of the sample's frames."""
+        return [mask for run in self.runs for mask in run]
 
 
 class FirstSeconds(NamedTuple):

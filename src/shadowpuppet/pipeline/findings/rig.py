@@ -12,7 +12,7 @@ from shadowpuppet.camera.mask import Seen, may_be_person
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Finding
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.pipeline.findings.cautions import (
-    clutter_cautions,
+    added_cautions,
     condition_cautions,
     feet_cautions,
     film_cautions,
@@ -199,7 +199,7 @@ def _rig_doubts(look: RigLook, several: bool = False, recovered: frozenset[str] 
     for camera in look.cameras:
         doubts += [unlike.about(f"camera {camera.name!r}") for unlike in unlike_ready(camera.exact_overlap)]
         quality = () if several else camera.quality.warnings(whole >= ENOUGH)
-        warnings = (*condition_cautions(camera.condition, camera.name in recovered), *clutter_cautions(camera.left_out), *quality)
+        warnings = (*condition_cautions(camera.condition, camera.name in recovered), *added_cautions(camera.added), *quality)
         doubts += [warning.about(f"camera {camera.name!r}").at_most(HARMFUL) for warning in warnings]
         doubts += [Finding(f"camera {camera.name!r}: {why}", f"camera {camera.name!r} shows no usable silhouette", HARMFUL)
                    for why in [camera.quality.refusal()] if why]

@@ -22,7 +22,7 @@ from shadowpuppet.pipeline.footage import Footage, take_sample
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig, synchronized_frames
-from shadowpuppet.pipeline.silhouettes import Silhouettes, uncluttered_silhouettes
+from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
 from shadowpuppet.threads import usable_cores
 
 SETS, MIN_SETS, MAX_SETS_READ = 240, 120, 3000
@@ -126,7 +126,7 @@ def _silhouettes(footage: Footage, options: Options, steps: Steps) -> Silhouette
     steps("reading the film", footage.camera.name)
     sample = take_sample(footage, options.masks, brief_length(footage, options))
     steps("making silhouettes", footage.camera.name)
-    found = uncluttered_silhouettes(footage, sample, options)
+    found = learn_silhouettes(footage, sample, options)
     steps("", footage.camera.name)
     return found
 

@@ -13,7 +13,7 @@ from shadowpuppet.errors import SilhouetteError, VideoError, warn
 from shadowpuppet.io.masks.ready_masks import are_pictures, read_mask
 from shadowpuppet.pipeline.footage import LOOKED_AT, CameraFrame, Footage, take_sample
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.silhouettes import Silhouettes, uncluttered_silhouettes
+from shadowpuppet.pipeline.silhouettes import Silhouettes, learn_silhouettes
 from shadowpuppet.silhouette import ready_mask
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.video import Image
@@ -90,7 +90,7 @@ class FilmImages:
     @cached_property
     def _silhouettes(self) -> Silhouettes:
         longest = LOOKED_AT if self.footage.view.background is None else SAMPLE
-        return uncluttered_silhouettes(self.footage, take_sample(self.footage, longest=longest), self.options)
+        return learn_silhouettes(self.footage, take_sample(self.footage, longest=longest), self.options)
 
 
 def hull_function(cameras: Sequence[SceneCamera], settings: Options):
