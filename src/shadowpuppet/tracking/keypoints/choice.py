@@ -1,0 +1,47 @@
+"""Which of the persons that a detector found in each picture is the one that is tracked; never the most confident for being so."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.keypoints import Keypoints
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.keypoints.definitions import Landmarks
+from shadowpuppet.tracking.keypoints.sights import is_inside, sights_of
+
+NEAR = 0.1
+"""Distance (m) from a body's landmark at which a keypoint counts half."""
+People = tuple[int | None, ...]
+"""Index of the person in each camera's keypoints; None for none."""
+
+
+def people_in(masks: Sequence[Mask | None], cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None]) -> People:
+    """In each camera the person whose keypoints lie most in its mask (H, W), by their confidence; none if most of it lies outside."""
+    found = list[int | None]()
+    for mask, camera, each in zip(masks, cameras, keypoints):
+        if mask is None or each is None or not len(each.person):
+            found.append(None)
+            continue
+        inside = is_inside(camera, each.xy)
+        x, y = np.where(inside[..., None], each.xy, 0).round().astype(int).T
+        own = np.where(inside & mask[y, x].T, each.confidence, 0).sum(1)
+        best = int(own.argmax())
+        found.append(best if 2 * own[best] > np.where(inside, each.confidence, 0)[best].sum() else None)
+    return tuple(found)
+
+
+def people_at(points: Array, cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None], landmarks: Landmarks) -> People:
+    """In each camera the person whose keypoints lie nearest to a body's landmarks (K, 3), on whichever side."""
+    middle, number = points.mean(0), max((len(each.person) for each in keypoints if each is not None), default=0)
+    scores = np.zeros((number, len(cameras)))
+    for person in range(number):
+        chosen = [person if each is not None and person < len(each.person) else None for each in keypoints]
+        sights = sights_of(cameras, keypoints, chosen, landmarks, middle)
+        places = points[np.stack([sights.landmarks, landmarks.mirrored[sights.landmarks]])] - sights.origins
+        squares = (np.einsum("smi,mji->smj", places, sights.across) ** 2).sum(2).min(0)
+        np.add.at(scores[person], sights.cameras, 1 / (1 + squares / NEAR**2))
+    return tuple(int(each.argmax()) if each.any() else None for each in scores.T) if number else (None,) * len(cameras)

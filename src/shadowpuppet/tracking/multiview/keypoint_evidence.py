@@ -1,0 +1,105 @@
+"""What the keypoints of one frame say of the person: the rays to landmarks, poses by inverse kinematics, the front.
+
+They decide what is discrete, as person, front and sides, by candidates and log odds; and what is continuous by a cost added to that of the
+surface. Not in Ni 2008.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from shadowpuppet.body.whole_body import heading_column
+from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.keypoints import Keypoints
+from shadowpuppet.camera.mask import Mask
+from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.keypoints.candidates import candidates, pose_at, triangulated_landmarks
+from shadowpuppet.tracking.keypoints.choice import people_at, people_in
+from shadowpuppet.tracking.keypoints.front import KeypointFront, front_of
+from shadowpuppet.tracking.keypoints.likelihood import exchanges
+from shadowpuppet.tracking.keypoints.sights import Sights, sights_of
+from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, make_cloud
+from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refiner
+from shadowpuppet.tracking.multiview.settings import GaussNewtonSettings, MultiviewSettings
+
+NO_POINTS = make_cloud(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+
+
+class KeypointEvidence:
+    """Keypoints of one frame. Everything is computed on first use."""
+
+    def __init__(self, refiner: Refiner, sights: Sights, worth: float, settings: GaussNewtonSettings, last: Array | None = None) -> None:
+        """`worth`: what a nat of their surprise costs, m^2; `last`: the last pose (D,), if the person was tracked."""
+        self.refiner, self.sights, self.worth, self.settings, self.last = refiner, sights, worth, settings, last
+
+    def without(self, camera: int) -> KeypointEvidence:
+        """The same without a camera."""
+        return KeypointEvidence(self.refiner, self.sights.without(camera), self.worth, self.settings, self.last)
+
+    def cost(self, poses: Array) -> Array:
+        """Cost (N,), m^2, of poses (N, D)."""
+        return self.worth * self.refiner.surprises(poses, self.sights)
+
+    @cached_property
+    def proposed(self) -> Array:
+        """The pose (1, D) that the keypoints show, sides as in the last pose where that says that a camera has exchanged them; (0, D) if
+        too little is known."""
+        marks, body = self.refiner.landmarks, self.refiner.body
+        turned = None
+        if self.last is not None:
+            places = body.skeleton.points(self.last[None], marks.joints, marks.places)[0]
+            turned = exchanges(places, self.sights, marks)
+        pose = pose_at(body, marks, triangulated_landmarks(self.sights, marks, turned), self.last)
+        return self._fitted(np.zeros((0, len(body.skeleton.dofs))) if pose is None else pose[None])
+
+    @cached_property
+    def either_way(self) -> Array:
+        """Poses (n, D) with sides as the detector says, and exchanged."""
+        return self._fitted(candidates(self.refiner.body, self.refiner.landmarks, self.sights, self.last))
+
+    @cached_property
+    def front(self) -> KeypointFront | None:
+        """Which way the person faces; None if too little is known."""
+        headings = self.either_way[:, heading_column(self.refiner.body.skeleton)]
+        return front_of(headings, self.refiner.surprises(self.either_way, self.sights))
+
+    def _fitted(self, poses: Array) -> Array:
+        """Poses (n, D) brought to the rays, without the surface."""
+        if not len(poses):
+            return poses
+        s = self.settings
+        each = Pass(NO_POINTS, s.coarse + s.fine, s.fine_tau, sights=self.sights, worth=self.worth)
+        return self.refiner.descend(poses, each, poses, np.full(poses.shape[1], s.pull), s.damping)[0]
+
+
+class Observation(Protocol):
+    """What is needed of a frame's observation."""
+
+    @property
+    def masks(self) -> Sequence[Mask | None]:
+        """Masks (H, W), one per camera."""
+        ...
+
+    @property
+    def full(self) -> Cloud:
+        """The surface points, about where the person is."""
+        ...
+
+
+def keypoint_evidence(refiner: Refiner, cameras: Sequence[Camera], settings: MultiviewSettings, keypoints: Sequence[Keypoints | None],
+                      observation: Observation, last: Array | None = None) -> KeypointEvidence | None:
+    """What a frame's keypoints, one per camera, say of the person: of those in the masks, or of those nearest to the `last` pose (D,).
+    None without keypoints."""
+    if not settings.keypoints or not any(each is not None and len(each.person) for each in keypoints):
+        return None
+    marks = refiner.landmarks
+    if last is None:
+        people = people_in(observation.masks, cameras, keypoints)
+    else:
+        people = people_at(refiner.body.skeleton.points(last[None], marks.joints, marks.places)[0], cameras, keypoints, marks)
+    sights = sights_of(cameras, keypoints, people, marks, observation.full.origin)
+    return KeypointEvidence(refiner, sights, settings.keypoints * settings.sigma_cost**2, settings.gauss_newton, last)
