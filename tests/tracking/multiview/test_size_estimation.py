@@ -120,9 +120,9 @@ def test_who_is_found_in_a_later_frame_is_followed_back_to_the_first():
     first, seen = stout()[2], []
 
     class Watched(MultiviewTracker):
-        def start(self, rng, points, masks, also=None, facing=None):
+        def start(self, rng, points, masks, **more):
             seen.append(masks)
-            return super().start(rng, points, masks, also, facing)
+            return super().start(rng, points, masks, **more)
 
     tracker = Watched(anatomical(stout()[0]), tuple(actor.cameras()), SETTINGS)
     found = size_estimation._followed(np.random.default_rng(0), tracker, first, 3, None)

@@ -20,7 +20,8 @@ People = tuple[int | None, ...]
 
 
 def people_in(masks: Sequence[Mask | None], cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None]) -> People:
-    """In each camera the person whose keypoints lie most in its mask (H, W), by their confidence; none if most of it lies outside."""
+    """In each camera the person of whose keypoints' confidence most lies in its mask (H, W), less what lies outside; none if all have more
+    outside."""
     found = list[int | None]()
     for mask, camera, each in zip(masks, cameras, keypoints):
         if mask is None or each is None or not len(each.person):
@@ -28,9 +29,8 @@ def people_in(masks: Sequence[Mask | None], cameras: Sequence[Camera], keypoints
             continue
         inside = is_inside(camera, each.xy)
         x, y = np.where(inside[..., None], each.xy, 0).round().astype(int).T
-        own = np.where(inside & mask[y, x].T, each.confidence, 0).sum(1)
-        best = int(own.argmax())
-        found.append(best if 2 * own[best] > np.where(inside, each.confidence, 0)[best].sum() else None)
+        scores = np.where(inside, np.where(mask[y, x].T, each.confidence, -each.confidence), 0).sum(1)
+        found.append(int(scores.argmax()) if scores.max() > 0 else None)
     return tuple(found)
 
 

@@ -19,7 +19,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.keypoints.candidates import candidates, pose_at, triangulated_landmarks
 from shadowpuppet.tracking.keypoints.choice import people_at, people_in
-from shadowpuppet.tracking.keypoints.front import KeypointFront, front_of
+from shadowpuppet.tracking.keypoints.front import CERTAIN, KeypointFront, front_of
 from shadowpuppet.tracking.keypoints.likelihood import exchanges
 from shadowpuppet.tracking.keypoints.sights import Sights, sights_of
 from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, make_cloud
@@ -103,3 +103,14 @@ def keypoint_evidence(refiner: Refiner, cameras: Sequence[Camera], settings: Mul
         people = people_at(refiner.body.skeleton.points(last[None], marks.joints, marks.places)[0], cameras, keypoints, marks)
     sights = sights_of(cameras, keypoints, people, marks, observation.full.origin)
     return KeypointEvidence(refiner, sights, settings.keypoints * settings.sigma_cost**2, settings.gauss_newton, last)
+
+
+def opening_heading(looks: Sequence[KeypointEvidence], now: KeypointEvidence) -> float | None:
+    """The heading (rad) in the frame `now` if some looks at the person together are certain whether they face as the detector says."""
+    odds, column = 0.0, heading_column(now.refiner.body.skeleton)
+    for each in looks:
+        if len(each.proposed) and each.front is not None:
+            odds += each.front.odds * np.sign(np.cos(each.front.heading - each.proposed[0, column]))
+    if abs(odds) <= CERTAIN or not len(now.proposed):
+        return None
+    return float(now.proposed[0, column]) + (0.0 if odds > 0 else np.pi)

@@ -24,7 +24,7 @@ from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.tracking.keypoints.front import CERTAIN
 from shadowpuppet.tracking.multiview import arm_postures, body_postures, pose_search
 from shadowpuppet.tracking.multiview.arms_in_views import ArmsInViews, Counts
-from shadowpuppet.tracking.multiview.keypoint_evidence import keypoint_evidence
+from shadowpuppet.tracking.multiview.keypoint_evidence import KeypointEvidence, keypoint_evidence
 from shadowpuppet.tracking.multiview.local_search import LocalSearch
 from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation
 from shadowpuppet.tracking.multiview.posture_prior import PosturePrior
@@ -148,7 +148,7 @@ class MultiviewTracker:
               also: Cost | None = None, facing: float | None = None, keypoints: Sequence[Keypoints | None] = ()) -> MultiviewState:
         """A state from one frame's points and masks (H, W), as `search` finds it, or `absent`. Arguments as in `step` and `search`."""
         observation = MultiviewObservation(self.views, points, masks, also)
-        observation.keypoints = keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, observation)
+        observation.keypoints = self.shown(points, masks, keypoints)
         if self.is_present(observation):
             return self.search(rng, observation, facing)
         rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))
@@ -166,6 +166,12 @@ class MultiviewTracker:
         last = None if state.status in BLANK else state.pose
         observation.keypoints = keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, observation, last)
         return observation
+
+    def shown(self, points: SurfacePoints, masks: Sequence[Mask | None],
+              keypoints: Sequence[Keypoints | None] = ()) -> KeypointEvidence | None:
+        """What the keypoints of one frame say of the person, without an earlier one; None without any. Arguments as in `step`."""
+        observation = MultiviewObservation(self.views, points, masks)
+        return keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, observation)
 
     def _faced(self, rng: np.random.Generator, state: MultiviewState, found: MultiviewState,
                observation: MultiviewObservation) -> MultiviewState:
