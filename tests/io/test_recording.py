@@ -162,7 +162,7 @@ def test_a_live_camera_is_named_in_recording_toml(one, camera):
 
 @pytest.mark.parametrize(("text", "words"), [
     ("hieght = 1.8",
-     "found the key hieght; keys known there: background, calibration, duration, masks, rate, start, subject, training, truth"),
+     "found the key hieght; keys known there: background, calibration, duration, keypoints, masks, rate, start, subject, training, truth"),
     ("[subject]\nheigth = 1.8", "found the key subject.heigth; keys known there: distance, height"),
     ("[subject]\nheight = 183", "height: found 183, expected 0.5 to 2.5 metres"),
     ("[subject]\nheight = nan", "height: found nan"),

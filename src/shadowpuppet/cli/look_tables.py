@@ -10,6 +10,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 
 from shadowpuppet.cli.tables import pairs, seen_height, table
+from shadowpuppet.pipeline.findings.keypoints import KeypointsLook
 from shadowpuppet.pipeline.findings.look import CameraLook, Look, RigLook
 
 
@@ -29,7 +30,7 @@ def _camera_table(look: Look) -> RenderableType:
     return pairs([
         ("recording", look.recording), ("camera", _camera(look)), ("film", _film(look)), ("scale", look.scale),
         ("background", look.background), ("told by", _told_by(look.key) if look.key != "none" else None), ("silhouettes", _areas(look)),
-        ("exact masks", exact), ("quality", _quality(look) if look.refusal is None else None),
+        ("exact masks", exact), ("keypoints", _keypoints(look.keypoints)), ("quality", _quality(look) if look.refusal is None else None),
         ("person", _person(look.person) if look.person is not None else None),
     ])  # fmt: skip
 
@@ -64,6 +65,17 @@ def _quality(look: Look) -> str:
             f"specks and {quality.holes:.1f} holes a frame; touches {sides} of the picture")
 
 
+def _keypoints(look: KeypointsLook | None) -> str | None:
+    """What detectors found, and how well the rays of several cameras agree."""
+    if look is None:
+        return None
+    films = (f"{film.camera}: {film.landmarks} landmarks by {film.detector}, persons in {film.frames} frames, up to {film.persons} in one"
+             for film in look.films)
+    apart = ("" if look.apart is None else
+             f"; rays pass the points where they meet by {look.apart_pixels:.1f} px, {1000 * look.apart:.0f} mm (median)")
+    return "; ".join(films) + apart
+
+
 def _person(person: Mapping[str, Any]) -> str:
     fits = ", ".join(f"{name} {value:.2f}" for name, value in person["overlaps"].items()) if person["source"] == "references" else ""
     clean = f"; all this in clean silhouettes by {person['silhouettes']}: plain ones show no posture" if person["silhouettes"] else ""
@@ -88,7 +100,7 @@ def _rig_table(look: RigLook) -> RenderableType:
                 "" if apart is None else f"{apart:.1f} px") for camera, apart in zip(look.cameras, look.agreement.apart))  # fmt: skip
     keys = sorted({camera.key.split(":")[0] for camera in look.cameras} - {"none"})
     below = [("background", "; ".join(sorted(set(map(_background, look.cameras))))),
-             ("told by", ", ".join(map(_told_by, keys)) or None), *_rig_scale(look)]
+             ("told by", ", ".join(map(_told_by, keys)) or None), ("keypoints", _keypoints(look.keypoints)), *_rig_scale(look)]
     columns = ("camera", "pixels", "wide", "stands at, m", "person", "exact", "apart")
     if all(camera.exact_overlap is None for camera in look.cameras):
         columns, cameras = columns[:5] + columns[6:], (row[:5] + row[6:] for row in cameras)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +51,10 @@ class Project:
     """First and last frame used."""
     several: bool = False
     """Whether it states several people."""
+    keypoints: dict[str, Path] = field(default_factory=dict)
+    """Folders of OpenPose's files that the program wrote, by film."""
+    pose_model: Any = None
+    """The model of their detector, as its settings name it; or a tree of landmarks."""
     no_calibration: str = ""
     """Why there is no calibration, and what to do."""
 
@@ -96,7 +100,20 @@ def _pose2sim(folder: Path) -> Project | None:
     known = _Config(folder / "Config.toml", [config.get("project", {}) for config in configs])
     return Project("Pose2Sim", folder, folder.resolve().name, films, calibration, ("trc", folder / "pose-3d"), known.height(),
                    known.rate(), known.frames(),
-                   known.several(), "Pose2Sim's calibration, a file in calibration/ beside or above the trial, is missing")
+                   known.several(), _poses(folder / "pose"), _pose_model([config.get("pose") for config in configs]),
+                   "Pose2Sim's calibration, a file in calibration/ beside or above the trial, is missing")
+
+
+def _poses(folder: Path) -> dict[str, Path]:
+    """Folders <film>_json of keypoints; those in pose-sync/ and pose-associated/ have other frames."""
+    return {path.name.removesuffix("_json"): path for path in sorted(folder.glob("*_json")) if path.is_dir()}
+
+
+def _pose_model(tables: list[Any]) -> Any:
+    """`pose_model` of the first `[pose]` table that has it: a model's name, or the tree of landmarks that a table of that name holds."""
+    tables = [table for table in tables if isinstance(table, dict)]
+    name = next((table["pose_model"] for table in tables if "pose_model" in table), None)
+    return next((table[name] for table in tables if isinstance(name, str) and isinstance(table.get(name), dict | list)), name)
 
 
 def _levels(folder: Path) -> Iterator[Path]:

@@ -14,6 +14,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, choices, reason, typed, warn
 from shadowpuppet.io.calibration.calibration_files import UNITS, UPS, read_calibration
 from shadowpuppet.io.calibration.formats import find_calibration
+from shadowpuppet.io.keypoints.keypoint_files import KeypointSource, keypoints_in
 from shadowpuppet.io.picture_sizes import fitting
 from shadowpuppet.io.projects import RATES, Project, films_in, find_project, sources_in
 from shadowpuppet.io.recording_toml import RecordingNotes
@@ -58,6 +59,8 @@ class View:
     """Pictures or film of the empty scene."""
     masks: Path | None = None
     """Ready silhouettes, made by another program."""
+    keypoints: KeypointSource | None = None
+    """What a detector found in the film, not read yet."""
     start: float = 0.0
     """The recording's time 0 on the film's clock, seconds; earlier frames are left out."""
 
@@ -196,8 +199,10 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
     cameras = _cameras(folder, films, fov, calibration, notes)
     if project is not None:
         cameras = _in_order(cameras, films, project)
-    films, backgrounds, masks = (spelled_as(each, [c.name for c in cameras]) for each in (films, backgrounds, masks))
-    for kind, sources in (("video", films), ("background", backgrounds), ("masks", masks)):
+    names = [camera.name for camera in cameras]
+    films, backgrounds, masks = (spelled_as(each, names) for each in (films, backgrounds, masks))
+    keypoints = spelled_as(_keypoints(folder, notes, project), names)
+    for kind, sources in (("video", films), ("background", backgrounds), ("masks", masks), ("keypoints", keypoints)):
         _check_names(folder / kind if (folder / kind).is_dir() else folder, sources, cameras, asked, kind)
     missing = [c.name for c in cameras if c.name not in films]
     if missing:
@@ -205,8 +210,8 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
         instead = f" ({choices(pictures)} there: found a picture, expected a film)" if pictures else ""
         warn(f"{folder}: no film of {choices(missing)}{instead}; going on with {choices(films)}")
     starts = _starts(notes, cameras, asked)
-    views = tuple(fitting(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), starts.get(c.name, 0.0)))
-                  for c in cameras if c.name in films)
+    views = tuple(fitting(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), keypoints.get(c.name),
+                               starts.get(c.name, 0.0))) for c in cameras if c.name in films)
     truth = notes.file("truth") or _first(folder, "truth", ["csv", "trc"])
     training = notes.file("training") or _first(folder, "training", ["csv", "trc", "c3d", "bvh", "amc"])
     rate = notes.number("rate", RATES, "frames/s")
@@ -265,6 +270,18 @@ def _sources(folder: Path, kind: str, notes: RecordingNotes) -> dict[str, Any]:
     if kind == "video" and not found and not sources:
         found = films_in(folder)  # films lie in a recording's folder itself in many laboratories
     return {name: _only(paths) for name, paths in spelled_as(found, sources).items() if name not in sources} | sources
+
+
+def _keypoints(folder: Path, notes: RecordingNotes, project: Project | None) -> dict[str, KeypointSource]:
+    """Keypoints by camera: those named in recording.toml, else keypoints/<camera>.*, else the project's."""
+    table = notes.table("keypoints")
+    stated = {camera: notes.source("keypoints", camera) for camera in table if camera != "model"}
+    found = {name: _only(paths) for name, paths in keypoints_in(folder / "keypoints").items() if name not in stated} | stated
+    model = table.get("model")
+    if not found and project is not None:
+        films = set(map(composed, project.films))
+        found, model = {name: path for name, path in project.keypoints.items() if composed(name) in films}, model or project.pose_model
+    return {name: KeypointSource(Path(str(path)), model) for name, path in found.items()}
 
 
 def _only(paths: list[Path]) -> Path:

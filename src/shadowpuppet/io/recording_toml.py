@@ -13,7 +13,8 @@ from shadowpuppet.io.files.text import read_toml
 from shadowpuppet.names import composed
 from shadowpuppet.video import camera_number
 
-KEYS = ("subject", "rate", "duration", "calibration", "unit", "up", "truth", "training", "start", "video", "background", "masks")
+KEYS = ("subject", "rate", "duration", "calibration", "unit", "up", "truth", "training", "start", "video", "background", "masks",
+        "keypoints")
 """Keys of recording.toml."""
 
 
@@ -61,7 +62,7 @@ class RecordingNotes:
         return self._existing(key, self.data[key]) if key in self.data else None
 
     def source(self, kind: str, camera: str) -> Path | int | str:
-        """A camera's film, background or masks; a live camera may be named as a film."""
+        """A camera's film, background, masks or keypoints; a live camera may be named as a film."""
         value = self.table(kind)[camera]
         live = not isinstance(value, bool) and isinstance(value, (int, str)) and camera_number(value) is not None
         return value if live and kind == "video" else self._existing(f"{kind}.{camera}", value)

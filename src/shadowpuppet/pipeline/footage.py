@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, choices, warn
+from shadowpuppet.io.keypoints.film_keypoints import FilmKeypoints
 from shadowpuppet.io.masks.ready_masks import MaskKind, mask_kind, open_masks
 from shadowpuppet.io.person import read_person
 from shadowpuppet.io.picture_sizes import differ_by_padding
@@ -76,6 +77,11 @@ class Footage:
     def mask_kind(self) -> MaskKind:
         """How the ready silhouettes are written. Raises `SilhouetteError` or `VideoError`."""
         return MaskKind() if self.view.masks is None else mask_kind(self.view.masks, self.label)
+
+    @cached_property
+    def keypoints(self) -> FilmKeypoints | None:
+        """What a detector found in the film, in pixels of full size; None without it. Raises `FormatError`."""
+        return None if self.view.keypoints is None else self.view.keypoints.read(self.view.camera.size)
 
     def __getstate__(self) -> dict[str, object]:
         """What another process needs, which opens the film itself."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Generic, NamedTuple
@@ -16,6 +17,7 @@ from shadowpuppet.io.prior import read_prior
 from shadowpuppet.io.run_writer import RunWriter
 from shadowpuppet.pipeline.findings.camera import survey_camera
 from shadowpuppet.pipeline.findings.film import films_again
+from shadowpuppet.pipeline.findings.keypoints import look_at_keypoints
 from shadowpuppet.pipeline.findings.look import Look, RigLook, Survey
 from shadowpuppet.pipeline.findings.rig import survey_rig
 from shadowpuppet.pipeline.options import Options, check_used, plain_options
@@ -75,9 +77,10 @@ def look_at(recording: str | Path, options: Options | None = None, listener: Lis
     several. Raises a `ShadowPuppetError` if something cannot be used."""
     options = options or Options()
     rig = open_rig(recording, options)
-    if rig.is_multiview:
-        return survey_rig(rig, options, listener=listener).look
-    return prepare(generators(options)[0], rig, options, MONOCULAR, listener=listener).look
+    keypoints = look_at_keypoints(rig.footage)
+    look = (survey_rig(rig, options, listener=listener).look if rig.is_multiview
+            else prepare(generators(options)[0], rig, options, MONOCULAR, listener=listener).look)
+    return replace(look, keypoints=keypoints)
 
 
 @one_blas_thread()

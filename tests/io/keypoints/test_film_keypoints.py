@@ -13,7 +13,7 @@ from shadowpuppet.camera.keypoints import LANDMARKS, Keypoints
 from shadowpuppet.errors import FormatError, ShadowPuppetError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.files.npz import archive_bytes
 from shadowpuppet.io.keypoints.film_keypoints import film_keypoints, read_npz, write_keypoints
-from shadowpuppet.io.keypoints.gathering import landmark_of
+from shadowpuppet.io.keypoints.names import landmark_of
 from shadowpuppet.io.keypoints.script_output import read_jsonl
 
 SIZE = (640, 480)
@@ -52,8 +52,8 @@ def test_points_outside_the_picture_or_without_confidence_and_persons_without_po
 @pytest.mark.parametrize(("changes", "words"), [
     ({"names": ("nose", "nose")}, "names: found nose, nose"), ({"names": ("nose", "tail")}, "names: found nose, tail"),
     ({"names": ()}, "names: found "), ({"frame": [0, -1]}, "frame: found -1 to 0"), ({"frame": [0, 10**9]}, "frame: found 0 to 1000000000"),
-    ({"person": [0, -2]}, "person: found -2"), ({"confidence": np.full((2, 2), 1.5)}, "confidence: found [1.5], expected 0 to 1"),
-    ({"confidence": np.full((2, 2), -0.5)}, "confidence: found [-0.5]"), ({"xy": np.zeros((2, 3, 2))}, "xy: found shape (2, 3, 2)"),
+    ({"person": [0, -2]}, "person: found -2"), ({"confidence": np.full((2, 2), 1.5)}, "confidence: found 0 to 1.5, expected 0 to 1"),
+    ({"confidence": np.full((2, 2), -0.5)}, "confidence: found -0.5 to 0"), ({"xy": np.zeros((2, 3, 2))}, "xy: found shape (2, 3, 2)"),
 ])  # fmt: skip
 def test_what_cannot_be_keypoints_is_refused(changes, words):
     with pytest.raises(ShadowPuppetError) as error:
@@ -136,7 +136,7 @@ def test_a_scripts_landmarks_that_are_not_known_are_named(tmp_path):
     ([HEADER, {"people": [{"points": [None, [1, "2", 1]]}]}], "line 2: people[0].points: found a list of 2, expected 2 x 3 numbers"),
     ([HEADER, {"people": [{"id": "a", "points": []}]}], "line 2: people[0].id: found 'a', expected a whole number"),
     ([HEADER, {"people": [{"points": [[0.5, 0.7, 1], None]}]}], "points: found none beyond 1, expected pixels"),
-    ([HEADER, {"people": [{"points": [[5, 7, 50], None]}]}], "confidence: found [50.0], expected 0 to 1"),
+    ([HEADER, {"people": [{"points": [[5, 7, 50], None]}]}], "confidence: found 0 to 50, expected 0 to 1"),
 ])  # fmt: skip
 def test_a_scripts_lines_that_are_no_keypoints_are_refused_by_file_and_line(tmp_path, rows, words):
     path = lines(tmp_path / "a.jsonl", *rows)

@@ -77,9 +77,9 @@ def film_keypoints(names: Sequence[str], frame: ArrayLike, person: ArrayLike, xy
     _check(bool(((frames >= 0) & (frames < MOST_FRAMES)).all()), "frame", f"{frames.min(initial=0)} to {frames.max(initial=0)}",
            f"numbers from 0 to under {MOST_FRAMES}")
     _check(bool((persons >= -1).all()), "person", persons.min(initial=0), "-1 or more")
-    bad = sure[np.logical_or(sure < 0, sure > 1)]
-    _check(not bad.size, "confidence", f"{bad[:1].tolist()}", "0 to 1")
-    inside = ((points >= -0.5) & (points <= np.array([width, height]) - 0.5)).all(-1) & (sure > 0)
+    extreme = [float(np.nanmin(sure, initial=0)), float(np.nanmax(sure, initial=0))]
+    _check(extreme[0] >= 0 and extreme[1] <= 1, "confidence", f"{extreme[0]:g} to {extreme[1]:g}", "0 to 1")
+    inside = np.all((points >= -0.5) & (points <= np.array([width, height]) - 0.5), axis=-1) & (sure > 0)
     points[~inside], sure[~inside] = np.nan, 0
     order = np.argsort(frames, kind="stable")
     order = order[inside.any(1)[order]]

@@ -10,6 +10,7 @@ from shadowpuppet.calibration.agreement import Agreement
 from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.errors import Finding
+from shadowpuppet.pipeline.findings.keypoints import KeypointsLook
 from shadowpuppet.pipeline.footage import Sample
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
@@ -76,6 +77,8 @@ class RecordingLook:
     """Possible problems of the run, with their remedies."""
     refusal: str | None = None
     """Why tracking is hopeless; None if it is not."""
+    keypoints: KeypointsLook | None = None
+    """What detectors found in the films, if it was looked at and there is any."""
 
     @property
     def doubts(self) -> tuple[str, ...]:
