@@ -47,6 +47,7 @@ def test_an_exchange_of_one_camera_that_is_known_is_undone():
     known = np.zeros((actor.CAMERAS, 2))
     known[0, LEGS] = 0.9
     assert np.abs(triangulated_landmarks(wrong, MARKS, known) - places()).max() < 1e-6
+    assert np.abs(triangulated_landmarks(sights, MARKS, np.ones((actor.CAMERAS, 2))) - places()).max() < 1e-6
     two = wrong.without(4).without(3).without(2)
     assert np.abs(triangulated_landmarks(two, MARKS) - places()).max() > 0.05
 

@@ -26,11 +26,12 @@ SURE = 0.5
 
 def triangulated_landmarks(sights: Sights, landmarks: Landmarks, exchanged: Array | None = None) -> Array:
     """Places (K, 3) of the landmarks, world, metres; not a number of those that fewer than two cameras see. `exchanged`: probabilities
-    (C, 2) that a camera's arms and legs are the other side's."""
-    rows, turned = sights.landmarks, np.zeros(len(sights.landmarks), bool)
+    (C, 2) that a camera's arms and legs are the other side's, by the last pose; where most cameras seem to exchange them that pose is wrong
+    rather than the cameras."""
+    rows = sights.landmarks
     if exchanged is not None:
-        turned = exchanged[sights.cameras, landmarks.limbs[rows]] > SURE
-    rows = np.where(turned, landmarks.mirrored[rows], rows)
+        turned = (exchanged > SURE) & (exchanged[np.unique(sights.cameras)].mean(0) <= SURE)
+        rows = np.where(turned[sights.cameras, landmarks.limbs[rows]], landmarks.mirrored[rows], rows)
     shape = sights.size, len(landmarks.names)
     centres, rays, weights = np.zeros((shape[0], 3)), np.tile([0.0, 0.0, 1.0], (*shape, 1)), np.zeros(shape)
     centres[sights.cameras], rays[sights.cameras, rows] = sights.origins, sights.rays
