@@ -42,8 +42,9 @@ def test_a_paper_s_preset_is_for_its_own_recordings(preset, several, match):
 
 
 def test_the_papers_have_no_keypoints():
-    assert [make_options(values).uses_keypoints for values in ({}, {"preset": "ni2008"}, {"evidence": "silhouettes"})] == [True, False, False]
-    with pytest.raises(SettingsError, match="^evidence: found 'silhouettes,keypoints' with the preset ni2008, expected silhouettes"):
+    used = [make_options(values).uses_keypoints for values in ({}, {"preset": "ni2008"}, {"evidence": "silhouettes"})]
+    assert used == [True, False, False]
+    with pytest.raises(SettingsError, match=r"^evidence: found 'silhouettes,keypoints' with the preset ni2008, expected silhouettes"):
         check_used(make_options({"preset": "ni2008", "evidence": "silhouettes,keypoints"}), several=True)
 
 

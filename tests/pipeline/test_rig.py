@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from solids import looking
 
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, SilhouetteError
+from shadowpuppet.io.keypoints.film_keypoints import film_keypoints
 from shadowpuppet.io.recording import Recording, View
 from shadowpuppet.pipeline.findings.opening import kept_sets
-from shadowpuppet.io.keypoints.film_keypoints import film_keypoints
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, Opening, chosen_views, cut, spread_frames, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.repair.films import check_calibration
@@ -354,8 +354,8 @@ def test_masks_are_needed_of_every_camera(tmp_path):
 def test_keypoints_are_those_of_the_films_own_frames(tmp_path):
     """Of a film that begins later on its clock, and scaled as its pictures are; of a camera without a frame, and without any, none."""
     made = rig(tmp_path, steady(6), steady(6), starts=(0.2, 0.0))
-    numbered_by_frame = film_keypoints(["nose"], np.arange(6), np.full(6, -1), np.arange(6.0).repeat(2).reshape(6, 1, 2) + 10, np.ones((6, 1)),
-                                       "made", SIZE)
+    places = np.arange(6.0).repeat(2).reshape(6, 1, 2) + 10
+    numbered_by_frame = film_keypoints(["nose"], np.arange(6), np.full(6, -1), places, np.ones((6, 1)), "made", SIZE)
     half = replace(made.footage[0], camera=made.footage[0].view.camera.resized((SIZE[0] // 2, SIZE[1] // 2)))
     half.__dict__["keypoints"] = numbered_by_frame
     made = replace(made, footage=(half, made.footage[1]))

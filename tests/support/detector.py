@@ -31,16 +31,17 @@ class Detector(NamedTuple):
     """Error (m) of joints outside the picture, which are confident all the same."""
 
 
+USUAL = Detector()
 EXACT = Detector(0.0, 0.4, 0.0, 0.0, 0.0, 0.0)
 
 
 def detected(rng: np.random.Generator, cameras: Sequence[Camera], times: Array, names: Sequence[str], joints: Array,
-             by: Detector = Detector()) -> list[list[Keypoints]]:
+             by: Detector = USUAL) -> list[list[Keypoints]]:
     """Keypoints by frame and camera of a person's joints (T, K, 3), world; `names`: with sides, the left before the right of each pair."""
     T, K = joints.shape[:2]
     beside = joints + (by.offset * _mirrored(rng.standard_normal((K, 3)), names) @ _trunk(names, joints))
-    seen = [_in_one(rng, camera, times, beside, by) for camera in cameras]
-    return [[Keypoints(tuple(names), xy[t][None], confidence[t][None], np.array([-1]), "made") for xy, confidence in seen] for t in range(T)]
+    seen, nobody = [_in_one(rng, camera, times, beside, by) for camera in cameras], np.array([-1])
+    return [[Keypoints(tuple(names), xy[t][None], sure[t][None], nobody, "made") for xy, sure in seen] for t in range(T)]
 
 
 def _in_one(rng: np.random.Generator, camera: Camera, times: Array, joints: Array, by: Detector) -> tuple[Array, Array]:

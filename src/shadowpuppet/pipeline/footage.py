@@ -228,8 +228,8 @@ def camera_footage(recording: Recording, view: View, options: Options) -> Footag
         raise RecordingError(f"{recording.path}: no ready silhouettes in it, expected masks/{view.camera.name}.mkv or a folder of pictures "
                              f"masks/{view.camera.name}/; leave --masks out to make them")
     if options.evidence is not None and "keypoints" in options.evidence and view.keypoints is None:
-        raise RecordingError(f"{recording.path}: no keypoints of camera {view.camera.name!r} in it, expected keypoints/{view.camera.name}.npz "
-                             "or another detector's file; leave --evidence out to do without")
+        raise RecordingError(f"{recording.path}: no keypoints of camera {view.camera.name!r} in it, expected "
+                             f"keypoints/{view.camera.name}.npz or another detector's file; leave --evidence out to do without")
     if not options.uses_keypoints:
         view = replace(view, keypoints=None)
     camera = view.camera.resized(worked_size(view.camera.size, options.max_size))

@@ -196,8 +196,8 @@ def check_used(options: Options, several: bool) -> None:
         raise SettingsError(f"preset: found {options.preset!r}, a method for {other}; expected with {cameras} one of {choices(presets)}"
                             f"{instead}")
     if options.uses_keypoints and options.preset != "default":
-        raise SettingsError(f"evidence: found {options.evidence!r} with the preset {options.preset}, expected silhouettes: the papers have no "
-                            "keypoints")
+        raise SettingsError(f"evidence: found {options.evidence!r} with the preset {options.preset}, expected silhouettes: the papers have "
+                            "no keypoints")
     given = {name: getattr(options, name) for name in ("preset", "body") if getattr(options, name) is not None}
     usual, now = plain_values(make_options(given)), plain_values(options)
     idle = [name for key in (OF_ONE if several else OF_SEVERAL) for name in _changed(key, usual[key], now[key])]

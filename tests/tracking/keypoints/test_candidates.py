@@ -1,4 +1,4 @@
-"""Poses from keypoints: the person's own, however the body stood before; with sides exchanged the other way round; what is unknown stays."""
+"""Poses from keypoints: the person's own, however the body stood before; with sides exchanged turned round; what is unknown stays."""
 
 from __future__ import annotations
 

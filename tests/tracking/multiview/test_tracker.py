@@ -10,7 +10,7 @@ from dataclasses import replace
 import actor
 import numpy as np
 import pytest
-from detector import Detector, detected
+from detector import detected
 
 from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.camera.keypoints import Keypoints
@@ -414,10 +414,10 @@ def test_a_tracker_without_settings_is_the_default():
 
 
 @functools.cache
-def found_in(frames: int = 12, by: Detector = Detector()) -> list[list[Keypoints]]:
+def found_in(frames: int = 12) -> list[list[Keypoints]]:
     marks, poses = landmarks_of(actor.body()), actor.filmed(frames=frames)[0]
     joints = actor.body().skeleton.points(poses, marks.joints, marks.places)
-    return detected(np.random.default_rng(1), actor.cameras(), np.arange(frames) / 20, marks.names, joints, by)
+    return detected(np.random.default_rng(1), actor.cameras(), np.arange(frames) / 20, marks.names, joints)
 
 
 def turned_round(pose: np.ndarray) -> np.ndarray:

@@ -30,13 +30,18 @@ def triangulated_landmarks(sights: Sights, landmarks: Landmarks, exchanged: Arra
     rather than the cameras."""
     rows = sights.landmarks
     if exchanged is not None:
-        turned = (exchanged > SURE) & (exchanged[np.unique(sights.cameras)].mean(0) <= SURE)
+        turned = (exchanged > SURE) & ~seem_wrong(exchanged, sights)
         rows = np.where(turned[sights.cameras, landmarks.limbs[rows]], landmarks.mirrored[rows], rows)
     shape = sights.size, len(landmarks.names)
     centres, rays, weights = np.zeros((shape[0], 3)), np.tile([0.0, 0.0, 1.0], (*shape, 1)), np.zeros(shape)
     centres[sights.cameras], rays[sights.cameras, rows] = sights.origins, sights.rays
     weights[sights.cameras, rows] = 1 - sights.outlying
     return meeting_points(centres, rays, weights) if shape[0] > 1 else np.full((shape[1], 3), np.nan)
+
+
+def seem_wrong(exchanged: Array, sights: Sights) -> NDArray[np.bool_]:
+    """Whether most cameras seem to exchange arms, and legs, (2,), so that the pose is wrong by which they seem to (C, 2)."""
+    return np.asarray(exchanged[np.unique(sights.cameras)].mean(0) > SURE) if len(sights.cameras) else np.zeros(2, bool)
 
 
 def pose_at(body: Body, landmarks: Landmarks, places: Array, last: Array | None = None) -> Array | None:

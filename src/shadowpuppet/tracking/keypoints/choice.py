@@ -11,10 +11,8 @@ from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.keypoints.definitions import Landmarks
-from shadowpuppet.tracking.keypoints.sights import is_inside, sights_of
+from shadowpuppet.tracking.keypoints.sights import NEAR, is_inside, sights_of
 
-NEAR = 0.1
-"""Distance (m) from a body's landmark at which a keypoint counts half."""
 People = tuple[int | None, ...]
 """Index of the person in each camera's keypoints; None for none."""
 
@@ -37,11 +35,11 @@ def people_in(masks: Sequence[Mask | None], cameras: Sequence[Camera], keypoints
 def people_at(points: Array, cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None], landmarks: Landmarks) -> People:
     """In each camera the person whose keypoints lie nearest to a body's landmarks (K, 3), on whichever side."""
     middle, number = points.mean(0), max((len(each.person) for each in keypoints if each is not None), default=0)
+    if number == 1:
+        return tuple(0 if each is not None and len(each.person) else None for each in keypoints)
     scores = np.zeros((number, len(cameras)))
     for person in range(number):
         chosen = [person if each is not None and person < len(each.person) else None for each in keypoints]
         sights = sights_of(cameras, keypoints, chosen, landmarks, middle)
-        places = points[np.stack([sights.landmarks, landmarks.mirrored[sights.landmarks]])] - sights.origins
-        squares = (np.einsum("smi,mji->smj", places, sights.across) ** 2).sum(2).min(0)
-        np.add.at(scores[person], sights.cameras, 1 / (1 + squares / NEAR**2))
+        np.add.at(scores[person], sights.cameras, 1 / (1 + sights.squares_from(points, landmarks) / NEAR**2))
     return tuple(int(each.argmax()) if each.any() else None for each in scores.T) if number else (None,) * len(cameras)

@@ -63,7 +63,7 @@ class Landmarks(NamedTuple):
         return self.joints, self.places, self.mirrored, self.limbs
 
 
-NO_LANDMARKS = Landmarks((), np.zeros(0, np.int64), np.zeros((0, 3)), *np.zeros((2, 0), np.int64), np.zeros(0))
+NO_LANDMARKS = Landmarks((), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
 """Of a body whose keypoints do not matter."""
 
 
@@ -73,9 +73,9 @@ def landmarks_of(body: Body) -> Landmarks:
     names = tuple(f"{side}_{name}" for name in known for side in SIDES)
     placed = [_placed(body, f"{side}_{each.landmark}", np.array(each.offset) * (1, 1 if side == "left" else -1, 1))
               for each in known.values() for side in SIDES]
-    return Landmarks(names, np.array([joint for joint, _ in placed], np.int64), np.array([place for _, place in placed], float).reshape(-1, 3),
-                     np.arange(len(names)) ^ 1, np.repeat(np.array([each.limbs for each in known.values()], np.int64), 2),
-                     np.repeat(np.array([each.deviation for each in known.values()], float), 2))
+    joints, places = np.array([joint for joint, _ in placed], np.int64), np.array([place for _, place in placed], float).reshape(-1, 3)
+    limbs, deviations = (np.array([each[n] for each in known.values()]).repeat(2) for n in (1, 2))
+    return Landmarks(names, joints, places, np.arange(len(names)) ^ 1, limbs.astype(np.int64), deviations.astype(float))
 
 
 def _placed(body: Body, landmark: str, offset: Array) -> tuple[int, Array]:

@@ -8,7 +8,6 @@ are a mixture of four. A surprise is -log p, less that of a ray through the land
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import device, kernel
@@ -16,7 +15,7 @@ from shadowpuppet.tracking.keypoints.definitions import ARMS, LEGS, Landmarks
 from shadowpuppet.tracking.keypoints.sights import Sights
 
 NU = 4
-"""Degrees of freedom: of MediaPipe's errors on a made film 3.4."""
+"""Degrees of freedom: of MediaPipe's errors on a made film 3.4. The exponent of the density, NU / 2 + 1, is 3."""
 BOX = 2.0
 """Area (m^2) over which keypoints on something else are spread: that of a person's height and reach of one arm."""
 EXCHANGED = 0.02
@@ -76,7 +75,7 @@ def _densities(point, m, sights):  # pragma: no cover
     """Densities of ray `m` if it leads to a landmark at a place (3,), and to something else."""
     square, outlying = sights.squares[m], sights.outlying[m]
     falloff = 1 + across(point, m, sights) / (NU * square)
-    return (1 - outlying) / (2 * np.pi * square) * falloff ** (-0.5 * NU - 1), outlying / BOX
+    return (1 - outlying) / (2 * np.pi * square * falloff * falloff * falloff), outlying / BOX
 
 
 @device

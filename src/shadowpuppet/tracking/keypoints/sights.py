@@ -19,6 +19,9 @@ OUTLYING, DOUBTED = 0.02, 0.6
 """Probability that a keypoint of confidence 1 is on something else, as another person's or behind the body; and how much greater it is at
 confidence 0."""
 
+NEAR = 0.1
+"""Distance (m) from a body's landmark to a ray that leads to it: four scales at a distance of 4 m."""
+
 
 class Sights(NamedTuple):
     """M rays to landmarks of one person, world, metres."""
@@ -40,7 +43,14 @@ class Sights(NamedTuple):
 
     def without(self, camera: int) -> Sights:
         """Those of the other cameras."""
-        return Sights(*(values[self.cameras != camera] for values in self))
+        others = self.cameras != camera
+        return Sights(self.origins[others], self.rays[others], self.across[others], self.landmarks[others], self.cameras[others],
+                      self.squares[others], self.outlying[others])
+
+    def squares_from(self, points: Array, landmarks: Landmarks) -> Array:
+        """Squared distances (M,) of the rays from places (K, 3) of the landmarks, each from the nearer of both sides'."""
+        places = points[np.stack([self.landmarks, landmarks.mirrored[self.landmarks]])] - self.origins
+        return (np.einsum("smi,mji->smj", places, self.across) ** 2).sum(2).min(0)
 
     @property
     def size(self) -> int:
@@ -48,7 +58,8 @@ class Sights(NamedTuple):
         return int(self.cameras.max(initial=-1)) + 1
 
 
-NO_SIGHTS = Sights(*np.zeros((2, 0, 3)), np.zeros((0, 2, 3)), *np.zeros((2, 0), np.int64), *np.zeros((2, 0)))
+NO_SIGHTS = Sights(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0),
+                   np.zeros(0))
 """Without keypoints."""
 
 

@@ -49,7 +49,12 @@ class FirstFrame(NamedTuple):
 
 
 First = Sequence[FirstFrame | tuple[SurfacePoints, Sequence[Mask | None]]]
-"""Frames in order of time; two of the three without keypoints."""
+"""Frames in order of time, without keypoints also as pairs."""
+
+
+def first_frames(first: First) -> list[FirstFrame]:
+    """All of them with keypoints or none."""
+    return [each if isinstance(each, FirstFrame) else FirstFrame(each[0], each[1]) for each in first]
 
 
 class SeenHeight(NamedTuple):
@@ -65,6 +70,7 @@ def estimate_height(rng: np.random.Generator, make: Callable[[float], Body], cam
                     settings: MultiviewSettings) -> SeenHeight | None:
     """Height of the person in the `first` frames: that whose body, by `make`, fits a few frames best; None if no person is visible. The
     hull's extent does not give it: arms may be overhead, and the person may sit or lie. Neighbouring heights are tried downhill."""
+    first = first_frames(first)
     longest = longest_extent(first)
     if longest is None:
         return None

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -17,12 +16,12 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.keypoints.candidates import candidates, pose_at, triangulated_landmarks
+from shadowpuppet.tracking.keypoints.candidates import candidates, pose_at, seem_wrong, triangulated_landmarks
 from shadowpuppet.tracking.keypoints.choice import people_at, people_in
 from shadowpuppet.tracking.keypoints.front import CERTAIN, KeypointFront, front_of
 from shadowpuppet.tracking.keypoints.likelihood import exchanges
-from shadowpuppet.tracking.keypoints.sights import Sights, sights_of
-from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, make_cloud
+from shadowpuppet.tracking.keypoints.sights import NEAR, Sights, sights_of
+from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refiner
 from shadowpuppet.tracking.multiview.settings import GaussNewtonSettings, MultiviewSettings
 
@@ -47,12 +46,14 @@ class KeypointEvidence:
     @cached_property
     def proposed(self) -> Array:
         """The pose (1, D) that the keypoints show, sides as in the last pose where that says that a camera has exchanged them; (0, D) if
-        too little is known."""
-        marks, body = self.refiner.landmarks, self.refiner.body
-        turned = None
+        too little is known, or if the last pose is near enough to be refined."""
+        marks, body, turned = self.refiner.landmarks, self.refiner.body, None
         if self.last is not None:
             places = body.skeleton.points(self.last[None], marks.joints, marks.places)[0]
             turned = exchanges(places, self.sights, marks)
+            far = self.sights.squares_from(places, marks) > NEAR**2
+            if np.bincount(self.sights.landmarks[far], minlength=1).max() < 2 and not seem_wrong(turned, self.sights).any():
+                return np.zeros((0, len(self.last)))
         pose = pose_at(body, marks, triangulated_landmarks(self.sights, marks, turned), self.last)
         return self._fitted(np.zeros((0, len(body.skeleton.dofs))) if pose is None else pose[None])
 
@@ -76,32 +77,18 @@ class KeypointEvidence:
         return self.refiner.descend(poses, each, poses, np.full(poses.shape[1], s.pull), s.damping)[0]
 
 
-class Observation(Protocol):
-    """What is needed of a frame's observation."""
-
-    @property
-    def masks(self) -> Sequence[Mask | None]:
-        """Masks (H, W), one per camera."""
-        ...
-
-    @property
-    def full(self) -> Cloud:
-        """The surface points, about where the person is."""
-        ...
-
-
 def keypoint_evidence(refiner: Refiner, cameras: Sequence[Camera], settings: MultiviewSettings, keypoints: Sequence[Keypoints | None],
-                      observation: Observation, last: Array | None = None) -> KeypointEvidence | None:
-    """What a frame's keypoints, one per camera, say of the person: of those in the masks, or of those nearest to the `last` pose (D,).
-    None without keypoints."""
+                      masks: Sequence[Mask | None], middle: Array, last: Array | None = None) -> KeypointEvidence | None:
+    """What a frame's keypoints, one per camera, say of the person: of those in the masks (H, W), or of those nearest to the `last` pose
+    (D,). `middle` (3,): about where the person is, world. None without keypoints."""
     if not settings.keypoints or not any(each is not None and len(each.person) for each in keypoints):
         return None
     marks = refiner.landmarks
     if last is None:
-        people = people_in(observation.masks, cameras, keypoints)
+        people = people_in(masks, cameras, keypoints)
     else:
         people = people_at(refiner.body.skeleton.points(last[None], marks.joints, marks.places)[0], cameras, keypoints, marks)
-    sights = sights_of(cameras, keypoints, people, marks, observation.full.origin)
+    sights = sights_of(cameras, keypoints, people, marks, middle)
     return KeypointEvidence(refiner, sights, settings.keypoints * settings.sigma_cost**2, settings.gauss_newton, last)
 
 

@@ -78,7 +78,7 @@ class MultiviewObservation:
 
     @cached_property
     def _origin(self) -> Array:
-        return self.surface.points.mean(0) if len(self.surface.points) else np.zeros(3)
+        return middle_of(self.surface)
 
     @property
     def rays(self) -> tuple[Sights, float]:
@@ -142,6 +142,11 @@ class MultiviewObservation:
         """Intersection over union of a drawn pose (D,) and the silhouettes, mean of all pictures; 0 without silhouettes."""
         overlaps = self.overlaps(pose)[list(self.seen)]
         return float(np.mean(overlaps)) if len(overlaps) else 0.0
+
+
+def middle_of(surface: SurfacePoints) -> Array:
+    """Mean (3,) of surface points, world; the origin without any."""
+    return surface.points.mean(0) if len(surface.points) else np.zeros(3)
 
 
 def _without(surface: SurfacePoints, views: BodyInViews, left_out: Sequence[Bits | None]) -> SurfacePoints:

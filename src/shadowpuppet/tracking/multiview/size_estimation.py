@@ -22,7 +22,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.tracking.multiview.bundle_adjustment import Measured, solve_bundle
-from shadowpuppet.tracking.multiview.height_estimation import First, FirstFrame
+from shadowpuppet.tracking.multiview.height_estimation import First, FirstFrame, first_frames
 from shadowpuppet.tracking.multiview.keypoint_evidence import opening_heading
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
@@ -151,10 +151,10 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
     frame in which the person is searched for. Raises `TrackingError` if no person is found.
 
     Silhouettes of a person who stands upright hardly distinguish front and back. With `both_fronts`, where a body that faces the other way
-    fits nearly as well, the person is measured facing that way, too, and what fits better is kept; not with cylinders, which have no front. A front
-    of which the frames' keypoints are certain is the front.
+    fits nearly as well, the person is measured facing that way, too, and what fits better is kept; not with cylinders, which have no
+    front. A front of which the frames' keypoints are certain is the front.
     """
-    first = [FirstFrame(*each) for each in first]
+    first = first_frames(first)
     plain = replace(settings, method="hybrid", refinement="gauss_newton")
 
     def followed(rng: np.random.Generator, sizes: Measured, facing: float | None) -> tuple[MultiviewTracker, list[Found]]:
@@ -231,7 +231,7 @@ def heading_of(body: Body, pose: Array) -> float:
 def _followed(rng: np.random.Generator, tracker: MultiviewTracker, first: First, begin: int, facing: float | None) -> list[Found]:
     """The frames in which the person is found: searched for in the frame `begin`, as facing a heading (rad) or any way, followed from there
     back to the first one and then through all, and searched for again if the overlap falls."""
-    state, found, best, frames = None, list[Found](), 0.0, [FirstFrame(*each) for each in first]
+    state, found, best, frames = None, list[Found](), 0.0, first_frames(first)
 
     def begun(frame: FirstFrame) -> MultiviewState:
         return tracker.start(rng, frame.points, frame.masks, facing=facing, keypoints=frame.keypoints)

@@ -26,7 +26,7 @@ from shadowpuppet.tracking.multiview import arm_postures, body_postures, pose_se
 from shadowpuppet.tracking.multiview.arms_in_views import ArmsInViews, Counts
 from shadowpuppet.tracking.multiview.keypoint_evidence import KeypointEvidence, keypoint_evidence
 from shadowpuppet.tracking.multiview.local_search import LocalSearch
-from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation
+from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, middle_of
 from shadowpuppet.tracking.multiview.posture_prior import PosturePrior
 from shadowpuppet.tracking.multiview.proposals import Proposals
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refine, Refiner
@@ -164,14 +164,14 @@ class MultiviewTracker:
         out = [None if pixels is None else pack(pixels) for pixels in beside]
         observation = MultiviewObservation(self.views, points, masks, also, out)
         last = None if state.status in BLANK else state.pose
-        observation.keypoints = keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, observation, last)
+        middle = middle_of(points)
+        observation.keypoints = keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, masks, middle, last)
         return observation
 
     def shown(self, points: SurfacePoints, masks: Sequence[Mask | None],
               keypoints: Sequence[Keypoints | None] = ()) -> KeypointEvidence | None:
         """What the keypoints of one frame say of the person, without an earlier one; None without any. Arguments as in `step`."""
-        observation = MultiviewObservation(self.views, points, masks)
-        return keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, observation)
+        return keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, masks, middle_of(points))
 
     def _faced(self, rng: np.random.Generator, state: MultiviewState, found: MultiviewState,
                observation: MultiviewObservation) -> MultiviewState:

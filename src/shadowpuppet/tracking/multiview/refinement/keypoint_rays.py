@@ -6,6 +6,9 @@ from shadowpuppet.jit import kernel
 from shadowpuppet.tracking.keypoints.likelihood import attraction, sides, sum_surprises
 from shadowpuppet.tracking.multiview.refinement.free_space import add_equation, placed
 
+LEAST = 1e-3
+"""Probability of a side below which it does not pull."""
+
 
 @kernel
 def pull_to_rays(T, landmarks, sights, weight, origin, sums, places, logs, adding):  # pragma: no cover
@@ -31,6 +34,8 @@ def pull_to_rays(T, landmarks, sights, weight, origin, sums, places, logs, addin
         for side in range(2):
             k = mirrored[said] if side == 1 else said
             share = exchanged if side == 1 else 1 - exchanged
+            if share < LEAST:
+                continue
             x, own = places[k], sums[joints[k]]
             pull = weight * share * attraction(x, m, sights)
             for i in range(2):
