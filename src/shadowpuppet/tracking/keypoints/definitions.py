@@ -6,6 +6,7 @@ frame of the segment that it moves with, as a shoulder does with the chest, and 
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -67,6 +68,7 @@ NO_LANDMARKS = Landmarks((), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0
 """Of a body whose keypoints do not matter."""
 
 
+@lru_cache(64)
 def landmarks_of(body: Body) -> Landmarks:
     """The landmarks of a whole body that its own are the places of."""
     known = {name: each for name, each in DEFINITIONS.items() if f"left_{each.landmark}" in body.landmarks}

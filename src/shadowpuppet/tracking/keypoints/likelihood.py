@@ -36,6 +36,22 @@ def exchanges(points: Array, sights: Sights, landmarks: Landmarks) -> Array:
     return np.array([sides(each)[1:] for each in logs]).reshape(-1, 2)
 
 
+def pulls(points: Array, sights: Sights, landmarks: Landmarks) -> tuple[NDArray[np.int64], Array]:
+    """The landmark (M,) to which each ray probably leads, on the side that its camera seems to see, given the landmarks' places (K, 3); and
+    the derivative (M,) of the surprise by its squared distance."""
+    turned = exchanges(points, sights, landmarks)[sights.cameras, landmarks.limbs[sights.landmarks]] > 0.5
+    chosen = np.where(turned, landmarks.mirrored[sights.landmarks], sights.landmarks)
+    out = np.zeros(len(chosen))
+    _attractions(np.ascontiguousarray(points), chosen, sights, out)
+    return chosen, out
+
+
+@kernel
+def _attractions(points, chosen, sights, out):  # pragma: no cover
+    for m in range(out.size):
+        out[m] = attraction(points[chosen[m]], m, sights)
+
+
 @kernel
 def _surprises(points, mirrored, limbs, sights, logs, out):  # pragma: no cover
     for n in range(points.shape[0]):

@@ -39,21 +39,27 @@ class KeypointEvidence:
         """The same without a camera."""
         return KeypointEvidence(self.refiner, self.sights.without(camera), self.worth, self.settings, self.last)
 
+    @property
+    def rays(self) -> tuple[Sights, float]:
+        """The rays, and what a nat of their surprise costs, m^2."""
+        return self.sights, self.worth
+
     def cost(self, poses: Array) -> Array:
         """Cost (N,), m^2, of poses (N, D)."""
         return self.worth * self.refiner.surprises(poses, self.sights)
 
     @cached_property
     def proposed(self) -> Array:
-        """The pose (1, D) that the keypoints show, sides as in the last pose where that says that a camera has exchanged them; (0, D) if
-        too little is known, or if the last pose is near enough to be refined."""
+        """The pose (1, D) that the keypoints show: the last one brought to the rays, or, where it does not come near them, that of the
+        triangulated landmarks, sides as in the last pose where that says that a camera has exchanged them; (0, D) if too little is known."""
         marks, body, turned = self.refiner.landmarks, self.refiner.body, None
         if self.last is not None:
-            places = body.skeleton.points(self.last[None], marks.joints, marks.places)[0]
+            near = self._fitted(self.last[None])
+            places = body.skeleton.points(near, marks.joints, marks.places)[0]
             turned = exchanges(places, self.sights, marks)
-            far = self.sights.squares_from(places, marks) > NEAR**2
-            if np.bincount(self.sights.landmarks[far], minlength=1).max() < 2 and not seem_wrong(turned, self.sights).any():
-                return np.zeros((0, len(self.last)))
+            far = self.sights.landmarks[self.sights.squares_from(places, marks) > NEAR**2]
+            if np.bincount(far, minlength=1).max() < 2 and not seem_wrong(turned, self.sights).any():
+                return near
         pose = pose_at(body, marks, triangulated_landmarks(self.sights, marks, turned), self.last)
         return self._fitted(np.zeros((0, len(body.skeleton.dofs))) if pose is None else pose[None])
 

@@ -21,6 +21,7 @@ from shadowpuppet.body.whole_body import heading_column
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array, evenly_spread
+from shadowpuppet.tracking.keypoints.sights import NO_SIGHTS
 from shadowpuppet.tracking.multiview.bundle_adjustment import Measured, solve_bundle
 from shadowpuppet.tracking.multiview.height_estimation import First, FirstFrame, first_frames
 from shadowpuppet.tracking.multiview.keypoint_evidence import opening_heading
@@ -170,14 +171,17 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
                 break
             chosen = evenly_spread(len(found), MAX_FRAMES)
             poses = np.array([found[i][1].pose for i in chosen])
-            seen = [MultiviewObservation(tracker.views, *first[found[i][0]][:2]) for i in chosen]
+            frames = [first[found[i][0]] for i in chosen]
+            seen = [MultiviewObservation(tracker.views, each.points, each.masks) for each in frames]
+            shown = [tracker.shown(*each, last=pose) for each, pose in zip(frames, poses, strict=True)]
             clouds = [each.cloud(POINT_STRIDE) for each in seen]
             pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
             centre, pull = map(np.array, zip(*pulls, strict=True))
             bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
                                   worth=INDEPENDENT_POINTS[settings.body], shared=shared,
                                   spaces=() if shared is None else [each.space for each in seen],
-                                  emptiness=EMPTINESS_SHARE * settings.gauss_newton.emptiness)
+                                  emptiness=EMPTINESS_SHARE * settings.gauss_newton.emptiness,
+                                  rays=[(NO_SIGHTS, 0.0) if each is None else each.rays for each in shown])
             sizes, residual = bundle.sizes, bundle.residual
         tracker, found = followed(rng, sizes, facing)
         if not found:
@@ -186,15 +190,15 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
         return SizeEstimate(sizes, tracker.body, residual, float(np.mean([state.overlap for _, state in found])), len(found), last.pose,
                             last.unexplained), tracker, found
 
-    shown = _shown_front(MultiviewTracker(make(expected), tuple(cameras), plain), first, begin)
-    best = measured(rng, shown)
+    front = _shown_front(MultiviewTracker(make(expected), tuple(cameras), plain), first, begin)
+    best = measured(rng, front)
     if best is None:
         raise TrackingError(f"nobody is found in the first {len(first)} frames' silhouettes: are they a whole person's, in two cameras or "
                             "more at once, and do the cameras agree? `shadowpuppet info` tells")
     other = rng.spawn(1)[0]  # the numbers drawn afterwards do not depend on whether a front is tried
     estimate, tracker, found = best
     about = min(found, key=lambda each: abs(each[0] - begin))
-    facing = _other_front(other, tracker, first, *about) if both_fronts and shown is None and settings.body != "cylinders" else None
+    facing = _other_front(other, tracker, first, *about) if both_fronts and front is None and settings.body != "cylinders" else None
     turned = None if facing is None else measured(other, facing)
     if turned is None:
         return estimate

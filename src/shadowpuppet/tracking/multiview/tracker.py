@@ -164,14 +164,14 @@ class MultiviewTracker:
         out = [None if pixels is None else pack(pixels) for pixels in beside]
         observation = MultiviewObservation(self.views, points, masks, also, out)
         last = None if state.status in BLANK else state.pose
-        middle = middle_of(points)
-        observation.keypoints = keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, masks, middle, last)
+        observation.keypoints = self.shown(points, masks, keypoints, last)
         return observation
 
     def shown(self, points: SurfacePoints, masks: Sequence[Mask | None],
-              keypoints: Sequence[Keypoints | None] = ()) -> KeypointEvidence | None:
-        """What the keypoints of one frame say of the person, without an earlier one; None without any. Arguments as in `step`."""
-        return keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, masks, middle_of(points))
+              keypoints: Sequence[Keypoints | None] = (), last: Array | None = None) -> KeypointEvidence | None:
+        """What the keypoints of one frame say of the person, who was in the `last` pose (D,) if it is known; None without any. Arguments as
+        in `step`."""
+        return keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, masks, middle_of(points), last)
 
     def _faced(self, rng: np.random.Generator, state: MultiviewState, found: MultiviewState,
                observation: MultiviewObservation) -> MultiviewState:
