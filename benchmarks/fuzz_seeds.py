@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "suppo
 import acclaim
 import biovision
 import calibrations
+import detections
 import motions
 import motive
 import png
@@ -29,6 +30,7 @@ from shadowpuppet.io.calibration.formats import is_calibration
 from shadowpuppet.io.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from shadowpuppet.io.export import export_run
 from shadowpuppet.io.intervals import read_intervals
+from shadowpuppet.io.keypoints.keypoint_files import read_keypoints
 from shadowpuppet.io.masks.ready_masks import mask_kind, open_masks
 from shadowpuppet.io.motion.amc import read_mocap
 from shadowpuppet.io.motion.joint_names import read_names
@@ -61,6 +63,8 @@ READERS: dict[str, Callable[[Path], object]] = {
     "run": lambda path: read_run(path.parent),
     "tables": lambda path: read_run(path.parent),
     "intervals": read_intervals,
+    "keypoints": lambda path: read_keypoints(path, detections.SIZE),
+    "poses": lambda path: read_keypoints(path.parent, detections.SIZE),
     "joints": read_joints,
     "motion": read_motion,
     "look": look_at_motion,
@@ -140,6 +144,7 @@ def write(folder: Path) -> None:
     for ending in ("png", "jpg", "bmp", "tif", "webp"):
         write_image(folder / "image" / f"a.{ending}", rng.integers(0, 255, (12, 16, 3), np.uint8))
     _masks(folder / "mask")
+    _keypoints(folder, rng)
     _project(folder / "project", made)
     _pictures(folder / "times", made[0].size)
     (folder / "times" / "timestamps.txt").write_text("0\n0.04\n0.08\n")
@@ -155,6 +160,16 @@ def _masks(folder: Path) -> None:
     (folder / "clear.png").write_bytes(png.palette_png(mask, (0, 0, 0, 128, 0, 0), (0, 255)))
     for name, image in (("alpha", np.dstack([mask] * 3 + [255 * mask])), ("deep", 7 * mask.astype(np.uint16))):
         (folder / f"{name}.png").write_bytes(cv2.imencode(".png", image)[1].tobytes())
+
+
+def _keypoints(folder: Path, rng: np.random.Generator) -> None:
+    """A film's keypoints in every format; of OpenPose's and Pose2Sim's, some frames."""
+    for name, path in detections.write_all(folder / "detections", detections.made_film(rng)).items():
+        if path.is_file():
+            (folder / "keypoints" / path.name).write_bytes(path.read_bytes())
+        else:
+            frame = min(path.iterdir())
+            (folder / "poses" / f"{name}_{len(name)}.json").write_bytes(frame.read_bytes())
 
 
 def _films(folder: Path, rng: np.random.Generator) -> None:

@@ -10,10 +10,11 @@ from waiting import LONG
 
 from shadowpuppet.cli import batch_terminal
 from shadowpuppet.cli.batch_terminal import LINES, BatchTerminal, _clock, _pace
-from shadowpuppet.cli.look_tables import _camera_table, _film, _quality, _rig_person, _rig_table
+from shadowpuppet.cli.look_tables import _camera_table, _film, _keypoints, _quality, _rig_person, _rig_table
 from shadowpuppet.cli.tables import error_table, files_in, metrics_table, people_table, show_next, verdict_of, verdict_table
 from shadowpuppet.cli.terminal import Terminal
 from shadowpuppet.errors import typed
+from shadowpuppet.pipeline.findings.keypoints import FilmKeypointsLook, KeypointsLook
 
 QUALITY = SimpleNamespace(frames=12, area=0.0512, area_change=0.0123, flicker=0.0045, specks=0.25, holes=1.5,
                           border={"left": 0.021, "right": 0.02, "bottom": 0.5})  # fmt: skip
@@ -22,7 +23,16 @@ PERSON = {"height": 1.756, "distance": 2.5, "source": "references", "overlaps": 
 LOOK = {"recording": "lab", "camera": "cam", "size": (640, 480), "worked_size": (320, 240), "fov": 60.4, "calibrated": True, "frames": 250,
         "rate": 29.97, "jitter": 0.0004, "scale": "by the height", "background": "a film", "key": "none", "area": 0.0512,
         "plain_area": 0.06, "exact_overlap": 0.9512, "exact_overlap_plain": 0.9, "quality": QUALITY, "refusal": None,
-        "person": PERSON}  # fmt: skip
+        "person": PERSON, "keypoints": None}  # fmt: skip
+
+
+def test_keypoints_are_listed_by_camera_with_how_far_rays_pass_each_other():
+    films = tuple(FilmKeypointsLook(name, "HALPE_26", 26, 120, 2) for name in ("left", "right"))
+    one = "left: 26 landmarks by HALPE_26, persons in 120 frames, up to 2 in one"
+    assert _keypoints(None) is None
+    assert _keypoints(KeypointsLook(films[:1])) == one
+    assert _keypoints(KeypointsLook(films, 0.0123, 4.21)) == (
+        f"{one}; {one.replace('left', 'right')}; rays pass the points where they meet by 4.2 px, 12 mm (median)")
 
 
 def test_the_look_at_a_recording(printed):
@@ -57,7 +67,7 @@ def test_the_look_at_several_cameras(printed):
                                exact_overlap=exact, key=key, background=f"background/{name}.mp4")
                for name, size, exact, key in (("a", (640, 480), None, "none"), ("b", (320, 240), 0.95, "colour: red"))]  # fmt: skip
     person = {"source": "training", "overlap": 0.912, "residual": 0.0123}
-    look = SimpleNamespace(recording="lab", frames=250, rate=25.0, cameras=cameras, person=person,
+    look = SimpleNamespace(recording="lab", frames=250, rate=25.0, cameras=cameras, person=person, keypoints=None,
                            agreement=SimpleNamespace(height=1.8, apart=(None, 1.25)))  # fmt: skip
     assert printed(_rig_table(look)) == [
         "recording lab", "cameras 2, 250 sets of pictures in step, 25 a second", "",

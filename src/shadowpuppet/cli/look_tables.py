@@ -20,6 +20,7 @@ def look_table(look: Look | RigLook, everything: bool = True) -> RenderableType:
         return _rig_table(look) if everything else pairs([*_rig_rows(look), *_rig_scale(look)[1:]])
     if not everything:
         return pairs([("recording", look.recording), ("camera", _camera(look)), ("film", _film(look)), ("scale", look.scale),
+                      ("keypoints", _keypoints(look.keypoints)),
                       ("person", _person(look.person) if look.person is not None else None)])
     return _camera_table(look)
 
@@ -85,7 +86,8 @@ def _person(person: Mapping[str, Any]) -> str:
 
 def _rig_rows(look: RigLook) -> list[tuple[str, str | None]]:
     count = f"{look.frames} sets" if look.frames else "sets not counted"
-    return [("recording", look.recording), ("cameras", f"{len(look.cameras)}, {count} of pictures in step, {look.rate:.4g} a second")]
+    return [("recording", look.recording), ("cameras", f"{len(look.cameras)}, {count} of pictures in step, {look.rate:.4g} a second"),
+            ("keypoints", _keypoints(look.keypoints))]
 
 
 def _rig_scale(look: RigLook) -> list[tuple[str, str | None]]:
@@ -100,7 +102,7 @@ def _rig_table(look: RigLook) -> RenderableType:
                 "" if apart is None else f"{apart:.1f} px") for camera, apart in zip(look.cameras, look.agreement.apart))  # fmt: skip
     keys = sorted({camera.key.split(":")[0] for camera in look.cameras} - {"none"})
     below = [("background", "; ".join(sorted(set(map(_background, look.cameras))))),
-             ("told by", ", ".join(map(_told_by, keys)) or None), ("keypoints", _keypoints(look.keypoints)), *_rig_scale(look)]
+             ("told by", ", ".join(map(_told_by, keys)) or None), *_rig_scale(look)]
     columns = ("camera", "pixels", "wide", "stands at, m", "person", "exact", "apart")
     if all(camera.exact_overlap is None for camera in look.cameras):
         columns, cameras = columns[:5] + columns[6:], (row[:5] + row[6:] for row in cameras)

@@ -41,6 +41,11 @@ def test_a_frame_holds_its_persons_and_a_frame_without_any_none():
     assert (made.persons == [1, 2]).all()
 
 
+def test_persons_of_a_frame_keep_their_order():
+    made = film(frame=np.tile([1, 0], 40), person=np.arange(80), xy=np.full((80, 2, 2), 5), confidence=np.ones((80, 2)))
+    assert made.person.tolist() == [*range(1, 80, 2), *range(0, 80, 2)]
+
+
 def test_points_outside_the_picture_or_without_confidence_and_persons_without_points_are_left_out():
     xy = np.array([[[-0.4, 479.4], [-0.6, 0]], [[640, 0], [np.nan, 3]], [[5, 5], [6, 6]]])
     made = film(frame=[0, 1, 2], person=[0, 1, 2], xy=xy, confidence=[[0.5, 0.5], [1, 1], [0, np.nan]])

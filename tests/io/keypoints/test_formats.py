@@ -146,6 +146,24 @@ def test_a_malformed_frame_of_openpose_is_refused_by_name(tmp_path, values, word
     assert str(error.value).startswith(f"{path}: {words}")
 
 
+@pytest.mark.parametrize(("stated", "person"), [
+    ([3], 3), (3.0, 3), ([-1], -1), (None, -1), ([], -1), ([1, 2], -1), ("a", -1), (float("nan"), -1), (float("inf"), -1), (2**40, -1),
+])  # fmt: skip
+def test_a_persons_number_is_one_or_unknown(tmp_path, stated, person):
+    folder = tmp_path / "a"
+    folder.mkdir()
+    write(folder / "0.json", {"people": [{"person_id": stated, "pose_keypoints_2d": [5, 5, 1] * 17}]})
+    assert read_keypoints(folder, SIZE).person.tolist() == [person]
+
+
+def test_a_person_of_whom_only_hands_were_found_is_left_out(tmp_path):
+    folder = tmp_path / "a"
+    folder.mkdir()
+    hands = {"pose_keypoints_2d": [], "hand_left_keypoints_2d": [5, 5, 1] * 21}
+    write(folder / "0.json", {"people": [hands, {"pose_keypoints_2d": [5, 5, 1] * 17}]})
+    assert len(read_keypoints(folder, SIZE).person) == 1
+
+
 def test_keys_that_are_not_known_are_named(made, tmp_path):
     film, _ = made
     folder = openpose(tmp_path / "a", film, mood="good")
@@ -160,6 +178,11 @@ def test_shares_of_the_picture_are_no_pixels(tmp_path):
     folder.mkdir()
     write(folder / "0.json", {"people": [{"pose_keypoints_2d": [0.5, 0.7, 0.9] * 17}]})
     assert refusal(folder) == "points: found none beyond 1, expected pixels, no shares of the picture"
+
+
+def test_points_that_are_all_outside_the_picture_are_another_films(tmp_path):
+    path = write(tmp_path / "a.json", [{"image_id": "0.jpg", "keypoints": [900, 600, 0.9] * 17}])
+    assert refusal(path) == "points: found all outside the picture of 640 x 480 pixels, expected those of its film"
 
 
 @pytest.mark.parametrize(("names", "words"), [
@@ -220,6 +243,7 @@ def test_a_malformed_list_of_persons_is_refused_by_name(tmp_path, values, words)
     ("scorer,a\nbodyparts,nose\n", "found the lines scorer, bodyparts, expected scorer, (individuals), bodyparts, coords"),
     ("scorer,a,a\nbodyparts,nose,nose\ncoords,x,y\n0,5,6\n", "coords: found x, y in 2 columns, expected x, y and likelihood"),
     ("scorer,a,a,a\nbodyparts,nose,nose,nose\ncoords,x,x,y\n0,5,6,7\n", "coords: found x, y in 3 columns"),
+    ("scorer,a,a,a,a\nbodyparts,nose,nose,nose,nose\ncoords,x,y,likelihood,x\n0,5,6,1,7\n", "coords: found likelihood, x, y in 4 columns"),
     ("scorer,a,a,a\nbodyparts,nose,nose,nose\ncoords,x,y,likelihood\n0,5,6\n", "line 4: found 3 cells, expected 4 as in the first"),
     ("scorer,a,a,a\nbodyparts,nose,nose,nose\ncoords,x,y,likelihood\nimg,5,6,1\n", "line 4: found the frame 'img', expected a whole"),
     ("scorer,a,a,a\nbodyparts,nose,nose,nose\ncoords,x,y,likelihood\n0,5,b,1\n", "line 4, column 'nose': found 'b', expected a number"),

@@ -53,7 +53,11 @@ class Gathered:
         seen = xy[confidence > 0]
         if np.isfinite(seen).any() and not (seen > 1).any():
             raise ShadowPuppetError("points: found none beyond 1, expected pixels, no shares of the picture")
-        return film_keypoints(tuple(self.known), self._frames, self._persons, xy, confidence, self.detector, self.size)
+        film = film_keypoints(tuple(self.known), self._frames, self._persons, xy, confidence, self.detector, self.size)
+        if np.isfinite(seen).any() and not len(film.frame):
+            raise ShadowPuppetError(f"points: found all outside the picture of {self.size[0]} x {self.size[1]} pixels, expected those of "
+                                    "its film")
+        return film
 
 
 class Numbered:
