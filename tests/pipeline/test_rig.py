@@ -14,9 +14,10 @@ from solids import looking
 
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, SilhouetteError
 from shadowpuppet.io.keypoints.film_keypoints import film_keypoints
+from shadowpuppet.io.keypoints.keypoint_files import KeypointSource
 from shadowpuppet.io.recording import Recording, View
 from shadowpuppet.pipeline.findings.opening import kept_sets
-from shadowpuppet.pipeline.footage import CameraFrame, Footage, Opening, chosen_views, cut, spread_frames, take_sample
+from shadowpuppet.pipeline.footage import CameraFrame, Footage, Opening, camera_footage, chosen_views, cut, spread_frames, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.repair.films import check_calibration
 from shadowpuppet.pipeline.rig import LATE, Rig, open_rig, read_frames, synchronized_frames
@@ -349,6 +350,15 @@ def test_what_serves_one_camera_is_refused_for_several(tmp_path, options, messag
 def test_masks_are_needed_of_every_camera(tmp_path):
     with pytest.raises(RecordingError, match=r"masks/cam1\.mkv"):
         open_rig(recording(tmp_path / "r"), Options(masks=True))
+
+
+def test_keypoints_that_are_asked_for_must_be_there(tmp_path):
+    made = rig(tmp_path, steady(3))
+    with pytest.raises(RecordingError, match=r"no keypoints of camera 'cam1' in it, expected keypoints/cam1.npz .* leave --evidence out"):
+        camera_footage(made.recording, made.recording.views[0], make_options({"evidence": "silhouettes,keypoints"}))
+    given = replace(made.recording.views[0], keypoints=KeypointSource(tmp_path / "keypoints.npz"))
+    left = [camera_footage(made.recording, given, make_options(values)).view.keypoints for values in ({}, {"evidence": "silhouettes"})]
+    assert left == [given.keypoints, None]
 
 
 def test_keypoints_are_those_of_the_films_own_frames(tmp_path):

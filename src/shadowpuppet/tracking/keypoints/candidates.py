@@ -20,8 +20,6 @@ from shadowpuppet.tracking.keypoints.triangulation import meeting_points
 
 CHAINS = (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
 """Joints of a limb."""
-SURE = 0.5
-"""Probability from which an exchange counts: the middle."""
 
 
 def triangulated_landmarks(sights: Sights, landmarks: Landmarks, exchanged: Array | None = None) -> Array:
@@ -30,7 +28,7 @@ def triangulated_landmarks(sights: Sights, landmarks: Landmarks, exchanged: Arra
     rather than the cameras."""
     rows = sights.landmarks
     if exchanged is not None:
-        turned = (exchanged > SURE) & ~seem_wrong(exchanged, sights)
+        turned = (exchanged > 0.5) & ~seem_wrong(exchanged, sights)
         rows = np.where(turned[sights.cameras, landmarks.limbs[rows]], landmarks.mirrored[rows], rows)
     shape = sights.size, len(landmarks.names)
     centres, rays, weights = np.zeros((shape[0], 3)), np.tile([0.0, 0.0, 1.0], (*shape, 1)), np.zeros(shape)
@@ -41,7 +39,7 @@ def triangulated_landmarks(sights: Sights, landmarks: Landmarks, exchanged: Arra
 
 def seem_wrong(exchanged: Array, sights: Sights) -> NDArray[np.bool_]:
     """Whether most cameras seem to exchange arms, and legs, (2,), so that the pose is wrong by which they seem to (C, 2)."""
-    return np.asarray(exchanged[np.unique(sights.cameras)].mean(0) > SURE) if len(sights.cameras) else np.zeros(2, bool)
+    return np.asarray(exchanged[np.unique(sights.cameras)].mean(0) > 0.5) if len(sights.cameras) else np.zeros(2, bool)
 
 
 def pose_at(body: Body, landmarks: Landmarks, places: Array, last: Array | None = None) -> Array | None:

@@ -16,7 +16,7 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.geometry import Array
 
-ARMS, LEGS = 0, 1
+ARMS, LEGS = range(2)
 """Limbs that a detector exchanges, the left for the right."""
 
 

@@ -8,6 +8,7 @@ are a mixture of four. A surprise is -log p, less that of a ray through the land
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import device, kernel

@@ -51,7 +51,7 @@ class KeypointEvidence:
     @cached_property
     def proposed(self) -> Array:
         """The pose (1, D) that the keypoints show: the last one brought to the rays, or, where it does not come near them, that of the
-        triangulated landmarks, sides as in the last pose where that says that a camera has exchanged them; (0, D) if too little is known."""
+        triangulated landmarks, sides as in the last pose where that says that a camera exchanges them; (0, D) if too little is known."""
         marks, body, turned = self.refiner.landmarks, self.refiner.body, None
         if self.last is not None:
             near = self._fitted(self.last[None])

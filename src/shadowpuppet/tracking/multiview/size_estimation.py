@@ -23,7 +23,7 @@ from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.tracking.keypoints.sights import NO_SIGHTS
 from shadowpuppet.tracking.multiview.bundle_adjustment import Measured, solve_bundle
-from shadowpuppet.tracking.multiview.height_estimation import First, FirstFrame, first_frames
+from shadowpuppet.tracking.multiview.height_estimation import FRAMES, First, FirstFrame, first_frames
 from shadowpuppet.tracking.multiview.keypoint_evidence import opening_heading
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
@@ -64,8 +64,6 @@ ALIKE = 1.2
 """Cost of the best pose that faces the other way, over that of a pose, up to which the front is doubted and both are measured."""
 SAME_FRAME = 0.01
 """Distance (m) of the means of two frames' surface points below which they are taken for the same frame's."""
-LOOKS = 4
-"""Number of frames in which the front that keypoints show is looked at: one each half second, as neighbouring ones are wrong together."""
 MIN_FRAMES = 4
 """Smallest number of frames with a person from which sizes are solved."""
 
@@ -211,7 +209,7 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
 
 def _shown_front(tracker: MultiviewTracker, first: Sequence[FirstFrame], begin: int) -> float | None:
     """The heading (rad) in frame `begin` if the keypoints of the first frames are certain of the front; None if they are not."""
-    looks = (tracker.shown(*first[n]) for n in evenly_spread(len(first), LOOKS))
+    looks = (tracker.shown(*first[n]) for n in evenly_spread(len(first), FRAMES))  # neighbouring ones are wrong together
     now = tracker.shown(*first[begin])
     return None if now is None else opening_heading([each for each in looks if each is not None], now)
 
