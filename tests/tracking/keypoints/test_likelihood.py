@@ -5,7 +5,7 @@ from __future__ import annotations
 import actor
 import numpy as np
 import pytest
-from detector import EXACT, detected
+from detector import EXACT, USUAL, detected
 
 from shadowpuppet.body.jacobian import make_chain, place_one
 from shadowpuppet.geometry import Array
@@ -112,3 +112,31 @@ def test_without_keypoints_nothing_is_added():
     cost, sums, _ = sums_of(actor.walk(actor.body().skeleton, 1)[0], NO_SIGHTS)
     assert cost == 0
     assert not sums.any()
+
+
+def plain_sums(points: Array, sights: Sights, weight: float) -> Array:
+    """What is added to the joints' normal equations, by definition: rows across each ray, weighted by the slope of -log p and the side."""
+    sums = np.zeros((len(actor.body().skeleton.joints), 27))
+    told = exchanges(points, sights, MARKS)
+    for m, said in enumerate(sights.landmarks):
+        exchanged = told[sights.cameras[m], MARKS.limbs[said]]
+        for k, share in ((said, 1 - exchanged), (MARKS.mirrored[said], exchanged)):
+            away, square, outlying = sights.origins[m] - points[k], sights.squares[m], sights.outlying[m]
+            r2 = away @ away - (away @ sights.rays[m]) ** 2
+            near = (1 - outlying) * (1 + r2 / (NU * square)) ** (-NU / 2 - 1) / (2 * np.pi * square)
+            pull = weight * share * near / (near + outlying / BOX) * (NU / 2 + 1) / (NU * square + r2)
+            for n in sights.across[m]:
+                row = np.concatenate([np.cross(points[k], n), n])
+                sums[MARKS.joints[k], :21] += pull * np.outer(row, row)[np.triu_indices(6)]
+                sums[MARKS.joints[k], 21:] += pull * row * (away @ n)
+    return sums
+
+
+@pytest.mark.kernels
+def test_the_normal_equations_are_those_of_the_plain_version():
+    poses = actor.walk(actor.body().skeleton, 6)
+    sights = seen(poses[0], USUAL, 4)
+    sights = sights._replace(landmarks=np.where(sights.cameras == 1, MARKS.mirrored[sights.landmarks], sights.landmarks))
+    _, sums, _ = sums_of(poses[3], sights, 2.0)
+    expected = plain_sums(places(poses[3])[0], sights, 2.0)
+    np.testing.assert_allclose(sums, expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())

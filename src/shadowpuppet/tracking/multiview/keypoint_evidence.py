@@ -74,6 +74,13 @@ class KeypointEvidence:
         headings = self.either_way[:, heading_column(self.refiner.body.skeleton)]
         return front_of(headings, self.refiner.surprises(self.either_way, self.sights))
 
+    def against(self, pose: Array) -> float:
+        """Log odds against the way that a pose (D,) faces; 0 if the keypoints show no other."""
+        column = heading_column(self.refiner.body.skeleton)
+        if not len(self.proposed) or np.cos(self.proposed[0, column] - pose[column]) > 0:
+            return 0.0
+        return 0.0 if self.front is None or np.cos(self.front.heading - pose[column]) > 0 else self.front.odds
+
     def _fitted(self, poses: Array) -> Array:
         """Poses (n, D) brought to the rays, without the surface."""
         if not len(poses):

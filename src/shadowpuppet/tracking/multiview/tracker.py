@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.whole_body import heading_column
 from shadowpuppet.camera.bits import pack
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import ColourCode
@@ -176,13 +175,12 @@ class MultiviewTracker:
     def _faced(self, rng: np.random.Generator, state: MultiviewState, found: MultiviewState,
                observation: MultiviewObservation) -> MultiviewState:
         """The state `found` in a frame, or one that faces as the keypoints show, once the odds of half a second's frames are certain."""
-        seen, column = observation.keypoints, heading_column(self.body.skeleton)
-        if seen is None or found.status in BLANK or not len(seen.proposed) or np.cos(seen.proposed[0, column] - found.pose[column]) > 0:
-            return found
-        if seen.front is None or np.cos(seen.front.heading - found.pose[column]) > 0:
-            return found
-        against = state.against + seen.front.odds * 2 / self.rate
-        return self.search(rng, observation, seen.front.heading) if against > CERTAIN else found._replace(against=against)
+        seen = observation.keypoints
+        odds = 0.0 if seen is None or found.status in BLANK else seen.against(found.pose)
+        against = state.against + odds * 2 / self.rate if odds else 0.0
+        if against > CERTAIN and seen is not None and seen.front is not None:
+            return self.search(rng, observation, seen.front.heading)
+        return found._replace(against=against)
 
     def _with_arms(self, also: Cost | None, state: MultiviewState, masks: Sequence[Mask | None],
                   codes: Sequence[ColourCode | None]) -> Cost | None:

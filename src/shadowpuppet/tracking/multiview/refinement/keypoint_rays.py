@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shadowpuppet.jit import kernel
-from shadowpuppet.tracking.keypoints.likelihood import EXCHANGED, attraction, sides, sum_surprises
+from shadowpuppet.tracking.keypoints.likelihood import attraction, sides, sum_surprises
 from shadowpuppet.tracking.multiview.refinement.free_space import add_equation, placed
 
 
@@ -31,8 +31,6 @@ def pull_to_rays(T, landmarks, sights, weight, origin, sums, places, logs, addin
         for side in range(2):
             k = mirrored[said] if side == 1 else said
             share = exchanged if side == 1 else 1 - exchanged
-            if share < EXCHANGED:  # less likely than it is without looking
-                continue
             x, own = places[k], sums[joints[k]]
             pull = weight * share * attraction(x, m, sights)
             for i in range(2):
