@@ -59,10 +59,10 @@ class View:
     """Pictures or film of the empty scene."""
     masks: Path | None = None
     """Ready silhouettes, made by another program."""
-    keypoints: KeypointSource | None = None
-    """What a detector found in the film, not read yet."""
     start: float = 0.0
     """The recording's time 0 on the film's clock, seconds; earlier frames are left out."""
+    keypoints: KeypointSource | None = None
+    """What a detector found in the film, not read yet."""
 
 
 @dataclass(frozen=True)
@@ -210,8 +210,8 @@ def _read_folder(folder: Path, fov: float | None, calibration: Path | None, proj
         instead = f" ({choices(pictures)} there: found a picture, expected a film)" if pictures else ""
         warn(f"{folder}: no film of {choices(missing)}{instead}; going on with {choices(films)}")
     starts = _starts(notes, cameras, asked)
-    views = tuple(fitting(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), keypoints.get(c.name),
-                               starts.get(c.name, 0.0))) for c in cameras if c.name in films)
+    views = tuple(fitting(View(c, films[c.name], backgrounds.get(c.name), masks.get(c.name), starts.get(c.name, 0.0),
+                               keypoints.get(c.name))) for c in cameras if c.name in films)
     truth = notes.file("truth") or _first(folder, "truth", ["csv", "trc"])
     training = notes.file("training") or _first(folder, "training", ["csv", "trc", "c3d", "bvh", "amc"])
     rate = notes.number("rate", RATES, "frames/s")
