@@ -70,7 +70,6 @@ def estimate_height(rng: np.random.Generator, make: Callable[[float], Body], cam
                     settings: MultiviewSettings) -> SeenHeight | None:
     """Height of the person in the `first` frames: that whose body, by `make`, fits a few frames best; None if no person is visible. The
     hull's extent does not give it: arms may be overhead, and the person may sit or lie. Neighbouring heights are tried downhill."""
-    first = first_frames(first)
     longest = longest_extent(first)
     if longest is None:
         return None
