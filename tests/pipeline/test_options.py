@@ -15,6 +15,7 @@ from shadowpuppet.threads import one_blas_thread
     ({"facing": "away", "initialization": {"sweeps": 1}}, True, "several cameras: facing, initialization.sweeps"),
     ({"multiview": {"particles": 30}, "prior": "walk.npz"}, False, "one camera: prior, multiview.particles"),
     ({"appearance": False, "training": {"regions": 9}}, False, "one camera: appearance, training.regions"),
+    ({"evidence": "silhouettes,keypoints"}, False, "one camera: evidence"),
 ])  # fmt: skip
 def test_what_has_no_effect_is_named(values, several, named):
     options = make_options(values)
@@ -38,6 +39,13 @@ def test_a_paper_s_preset_is_for_its_own_recordings(preset, several, match):
     check_used(options, not several)
     with pytest.raises(SettingsError, match=f"^preset: found {match}"):
         check_used(options, several)
+
+
+def test_the_papers_have_no_keypoints():
+    used = [make_options(values).uses_keypoints for values in ({}, {"preset": "ni2008"}, {"evidence": "silhouettes"})]
+    assert used == [True, False, False]
+    with pytest.raises(SettingsError, match=r"^evidence: found 'silhouettes,keypoints' with the preset ni2008, expected silhouettes"):
+        check_used(make_options({"preset": "ni2008", "evidence": "silhouettes,keypoints"}), several=True)
 
 
 def test_a_warning_names_the_caller_s_line_behind_the_wrappers_of_other_packages():

@@ -141,7 +141,7 @@ def test_the_same_seed_is_the_same_run(recording, run, tmp_path):
 def test_silhouettes_of_films_that_have_lost_detail_hold_the_body_less(untaught, monkeypatch, smeared, emptiness, silhouettes):
     monkeypatch.setattr(Silhouettes, "smeared", property(lambda self: smeared))
     used, options = [], make_options(QUICK)
-    monkeypatch.setattr(person_rig, "fit_in_views", lambda rng, cameras, views, options, *rest: used.append(options.multiview))
+    monkeypatch.setattr(person_rig, "fit_in_views", lambda rng, cameras, views, options, *rest, **more: used.append(options.multiview))
     person_rig.fit_multiview(np.random.default_rng(0), survey_rig(open_rig(untaught, options), options), options)
     assert (used[0].gauss_newton.emptiness, used[0].silhouettes) == pytest.approx((emptiness, silhouettes))
     assert for_smeared(options.multiview, 0.0) is options.multiview
@@ -166,15 +166,20 @@ def test_a_front_that_hardly_fits_better_is_doubted():
 
 
 def test_the_first_search_is_about_a_doubted_front(monkeypatch):
-    rng, facing = np.random.default_rng(0), []
+    rng, told = np.random.default_rng(0), []
     subject = person_rig.known_person(rng, actor.cameras(), make_options(FEW), made_rig.RATE, Person(TRUE, 1.75, "known"), {}, True)
     start = MultiviewTracker.start
-    monkeypatch.setattr(MultiviewTracker, "start", lambda self, *given, **named: facing.append(named) or start(self, *given, **named))
+
+    def watched(self, *given, facing, keypoints):
+        told.append(facing)
+        return start(self, *given, facing=facing, keypoints=keypoints)
+
+    monkeypatch.setattr(MultiviewTracker, "start", watched)
     seen = [subject.observe(Seen(masks)) for masks in views(2)]
     doubted = dataclasses.replace(subject, front=Front(0.3, seen[0].points.points.mean(0), 0.1))
     for person, observation in ((subject, seen[0]), (doubted, seen[0]), (doubted, seen[1])):
         person.next_state(np.random.default_rng(0), None, observation)
-    assert facing == [{"facing": None}, {"facing": 0.3}, {"facing": None}]
+    assert told == [None, 0.3, None]
 
 
 def test_only_a_height_that_was_estimated_is_doubted(monkeypatch):

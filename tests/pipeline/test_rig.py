@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 from solids import looking
 
 from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, SilhouetteError
+from shadowpuppet.io.keypoints.film_keypoints import film_keypoints
+from shadowpuppet.io.keypoints.keypoint_files import KeypointSource
 from shadowpuppet.io.recording import Recording, View
 from shadowpuppet.pipeline.findings.opening import kept_sets
-from shadowpuppet.pipeline.footage import CameraFrame, Footage, Opening, chosen_views, cut, spread_frames, take_sample
+from shadowpuppet.pipeline.footage import CameraFrame, Footage, Opening, camera_footage, chosen_views, cut, spread_frames, take_sample
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.repair.films import check_calibration
 from shadowpuppet.pipeline.rig import LATE, Rig, open_rig, read_frames, synchronized_frames
@@ -348,3 +350,27 @@ def test_what_serves_one_camera_is_refused_for_several(tmp_path, options, messag
 def test_masks_are_needed_of_every_camera(tmp_path):
     with pytest.raises(RecordingError, match=r"masks/cam1\.mkv"):
         open_rig(recording(tmp_path / "r"), Options(masks=True))
+
+
+def test_keypoints_that_are_asked_for_must_be_there(tmp_path):
+    made = rig(tmp_path, steady(3))
+    with pytest.raises(RecordingError, match=r"no keypoints of camera 'cam1' in it, expected keypoints/cam1.npz .* leave --evidence out"):
+        camera_footage(made.recording, made.recording.views[0], make_options({"evidence": "silhouettes,keypoints"}))
+    given = replace(made.recording.views[0], keypoints=KeypointSource(tmp_path / "keypoints.npz"))
+    left = [camera_footage(made.recording, given, make_options(values)).view.keypoints for values in ({}, {"evidence": "silhouettes"})]
+    assert left == [given.keypoints, None]
+
+
+def test_keypoints_are_those_of_the_films_own_frames(tmp_path):
+    """Of a film that begins later on its clock, and scaled as its pictures are; of a camera without a frame, and without any, none."""
+    made = rig(tmp_path, steady(6), steady(6), starts=(0.2, 0.0))
+    places = np.arange(6.0).repeat(2).reshape(6, 1, 2) + 10
+    numbered_by_frame = film_keypoints(["nose"], np.arange(6), np.full(6, -1), places, np.ones((6, 1)), "made", SIZE)
+    half = replace(made.footage[0], camera=made.footage[0].view.camera.resized((SIZE[0] // 2, SIZE[1] // 2)))
+    half.__dict__["keypoints"] = numbered_by_frame
+    made = replace(made, footage=(half, made.footage[1]))
+    for n, each in enumerate(synchronized_frames(made, [bright] * 2)):
+        found, other = each.seen.keypoints if n < 4 else ((), None)
+        assert other is None
+        assert n >= 4 or (found.xy[0, 0] == (10 + n + 2 + 0.5) / 2 - 0.5).all()
+    assert each.seen.keypoints == ()

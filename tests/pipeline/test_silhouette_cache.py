@@ -11,6 +11,7 @@ import pytest
 from follower import followed
 
 from shadowpuppet.camera.colour_codes import colour_codes, thinned
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.options import make_options
@@ -124,6 +125,14 @@ def test_a_store_keeps_the_colours_of_what_is_in_the_mask(rng, shape):
     np.testing.assert_array_equal(found.seen.codes[0], np.where(thinned(mask), codes, 0))
     assert found.seen.codes[1:] == (None, None)
     assert store.size > 2 * -(-mask.size // 8)
+
+
+def test_a_store_keeps_keypoints():
+    found = Keypoints(("nose",), np.ones((1, 1, 2)), np.ones((1, 1)), np.array([-1]), "made")
+    store, mask = MaskStore(), np.ones((8, 100), bool)
+    store.add(0.0, Seen((mask, mask), keypoints=(found, None)))
+    store.add(0.1, Seen((mask, mask)))
+    assert [each.seen.keypoints for each in store] == [(found, None), ()]
 
 
 def test_a_full_store_holds_nothing():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Seen
 from shadowpuppet.tracking.frozen import FROZEN_FRAMES, CameraWatch, is_frozen, same_silhouette
 from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
@@ -47,7 +48,10 @@ def test_a_frozen_camera_is_noticed_although_others_add_to_its_silhouette():
     for n in range(25):
         own = [person(n), person(5 if n >= 5 else n), person(n)]
         masks = [own[0], own[1] | person(n + 3), own[2]]
-        kept = watch(n / RATE, Seen(tuple(masks), own=tuple(own))).masks
+        keypoints = tuple(Keypoints(("nose",), np.ones((1, 1, 2)), np.ones((1, 1)), np.array([k]), "made") for k in range(3))
+        seen = watch(n / RATE, Seen(tuple(masks), own=tuple(own), keypoints=keypoints))
+        kept = seen.masks
+        assert [each is None for each in seen.keypoints] == [each is None for each in kept]
         assert all(a is None or a is b for a, b in zip(kept, masks))
         aside.append([a is None for a in kept])
         watch.tracked(())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,3 +38,7 @@ class Keypoints:
         if self.confidence.shape != expected or self.xy.shape != (*expected, 2):
             raise TrackingError(f"keypoints: found shapes {self.xy.shape} and {self.confidence.shape}, expected {(*expected, 2)} and "
                                 f"{expected}, persons and landmarks")
+
+    def scaled(self, size: tuple[int, int], to: tuple[int, int]) -> Keypoints:
+        """The same in pictures of another size than the film's (width, height)."""
+        return replace(self, xy=(self.xy + 0.5) * np.divide(to, size) - 0.5)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.camera.colour_codes import ColourCode
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.errors import TrackingError
 
 Mask = NDArray[np.bool_]
@@ -30,6 +31,8 @@ class Seen(NamedTuple):
     """Coarse colours (`camera.colour_codes`) in the light of the empty scene; empty: not known."""
     own: tuple[Mask | None, ...] = ()
     """Silhouettes (H, W) as each camera's own picture has them; empty where other cameras have added nothing to `masks`."""
+    keypoints: tuple[Keypoints | None, ...] = ()
+    """What a detector found, in pixels of these pictures; empty: without one."""
 
 
 def check_mask(mask: ArrayLike, size: tuple[int, int], what: str = "mask") -> Mask:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.errors import RecordingError, SettingsError, SilhouetteError, choices, warn
 from shadowpuppet.io.keypoints.film_keypoints import FilmKeypoints
 from shadowpuppet.io.masks.ready_masks import MaskKind, mask_kind, open_masks
@@ -49,6 +50,8 @@ class CameraFrame(NamedTuple):
     image: Image
     ready: Image | None
     """The frame of the recording's ready silhouettes; None without these."""
+    keypoints: Keypoints | None = None
+    """What a detector found in it, in pixels of the image; None without a detector."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +106,7 @@ class Footage:
             passed += 1
             return passed == read
 
+        found = self.keypoints
         ready_ones = open_masks(self.view.masks, self.mask_kind) if ready and self.view.masks is not None else None
         masks = None if ready_ones is None else fitted(ready_ones, self.camera.size, self.view.camera.size).read(of_masks)
         for frame in self.film.read(of_film):
@@ -111,7 +115,8 @@ class Footage:
             mask = None if masks is None else next(masks, None)
             if masks is not None and mask is None and strict:
                 raise SilhouetteError(f"{self.view.masks}: found {passed} silhouettes, expected one for each frame of {self.view.video}")
-            yield CameraFrame(max(frame.time - start, 0.0), frame.image, None if mask is None else mask.image)
+            keypoints = None if found is None else found.at(read - 1).scaled(self.view.camera.size, self.camera.size)
+            yield CameraFrame(max(frame.time - start, 0.0), frame.image, None if mask is None else mask.image, keypoints)
 
     @property
     def count(self) -> int | None:
@@ -222,6 +227,11 @@ def camera_footage(recording: Recording, view: View, options: Options) -> Footag
     if options.masks and view.masks is None:
         raise RecordingError(f"{recording.path}: no ready silhouettes in it, expected masks/{view.camera.name}.mkv or a folder of pictures "
                              f"masks/{view.camera.name}/; leave --masks out to make them")
+    if options.evidence is not None and "keypoints" in options.evidence and view.keypoints is None:
+        raise RecordingError(f"{recording.path}: no keypoints of camera {view.camera.name!r} in it, expected "
+                             f"keypoints/{view.camera.name}.npz or another detector's file; leave --evidence out to do without")
+    if not options.uses_keypoints:
+        view = replace(view, keypoints=None)
     camera = view.camera.resized(worked_size(view.camera.size, options.max_size))
     return Footage(recording, view, camera, region_of(options.region, view.camera, camera), options.label)
 

@@ -37,7 +37,7 @@ WITH_PRESETS: dict[str, tuple[Mapping[str, Any], Callable[..., Any]]] = {
     "tracker": (PRESETS, make_settings), "multiview": (MULTIVIEW_PRESETS, make_multiview_settings),
     "initialization": (INITIALIZATION_PRESETS, make_initialization)}  # fmt: skip
 """For each table of settings that has presets: these, and the function that makes the settings."""
-OF_ONE, OF_SEVERAL = ("distance", "facing", "tracker", "initialization"), ("prior", "appearance", "multiview", "training")
+OF_ONE, OF_SEVERAL = ("distance", "facing", "tracker", "initialization"), ("prior", "appearance", "evidence", "multiview", "training")
 """Options that matter with one camera only, and with several only."""
 PATHS = ("calibration", "background", "person", "prior")
 """Options that are file names, relative to the folder of the settings file that contains them."""
@@ -93,6 +93,9 @@ class Options:
     """Picture or film of the empty scene in place of the recording's own; one camera only."""
     masks: bool = False
     """Use the recording's ready silhouettes (masks/) instead of segmenting the film."""
+    evidence: Literal["silhouettes", "silhouettes,keypoints"] | None = None
+    """What a person is tracked by: silhouettes, or these and a detector's keypoints (keypoints/), several cameras only. By default by all
+    that the recording has; with the papers' presets by silhouettes."""
     people: Annotated[int, Field(ge=1, le=6)] | None = None
     """Number of people to follow, 1 to 6, with one camera or live 1; by default they are counted. Anybody else is ignored."""
     label: Annotated[int, Field(ge=0)] | None = None
@@ -133,6 +136,11 @@ class Options:
     """Estimation of the person's sizes."""
     training: PriorSettings = PriorSettings()
     """Learning a motion prior, from the recording's training motion or by `fit-prior`."""
+
+    @property
+    def uses_keypoints(self) -> bool:
+        """Whether keypoints are used where there are any."""
+        return "keypoints" in self.evidence if self.evidence is not None else self.preset == "default"
 
     @property
     def smoothing(self) -> tuple[Method, float]:
@@ -187,6 +195,9 @@ def check_used(options: Options, several: bool) -> None:
         other = "one camera" if several else "several cameras"
         raise SettingsError(f"preset: found {options.preset!r}, a method for {other}; expected with {cameras} one of {choices(presets)}"
                             f"{instead}")
+    if options.uses_keypoints and options.preset != "default":
+        raise SettingsError(f"evidence: found {options.evidence!r} with the preset {options.preset}, expected silhouettes: the papers have "
+                            "no keypoints")
     given = {name: getattr(options, name) for name in ("preset", "body") if getattr(options, name) is not None}
     usual, now = plain_values(make_options(given)), plain_values(options)
     idle = [name for key in (OF_ONE if several else OF_SEVERAL) for name in _changed(key, usual[key], now[key])]

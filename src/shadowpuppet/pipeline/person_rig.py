@@ -16,6 +16,7 @@ from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.bits import Bits
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask, Seen, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import HARMFUL, NOTED, Finding, SettingsError, choices
@@ -33,7 +34,7 @@ from shadowpuppet.tracking.arm_colours import ColourCounts
 from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.multiview import Before, MultiviewDoubt
 from shadowpuppet.tracking.doubt.steps import Trail
-from shadowpuppet.tracking.multiview.height_estimation import estimate_height
+from shadowpuppet.tracking.multiview.height_estimation import FirstFrame, estimate_height
 from shadowpuppet.tracking.multiview.settings import for_rate, for_smeared
 from shadowpuppet.tracking.multiview.size_estimation import Front, dressed, estimate_sizes, shared_deviations, size_deviations
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
@@ -92,9 +93,10 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
         if people == 0 or (state is None and people < 2):
             return None
         if state is None:
-            found = self.tracker.start(rng, points, seen.masks, facing=None if self.front is None else self.front.heading_in(points))
+            found = self.tracker.start(rng, points, seen.masks, facing=None if self.front is None else self.front.heading_in(points),
+                                       keypoints=seen.keypoints)
             return found if found.status != "absent" or self.tracker.settings.recover else None
-        return self.tracker.step(rng, state, points, seen.masks, codes=seen.codes)
+        return self.tracker.step(rng, state, points, seen.masks, codes=seen.codes, keypoints=seen.keypoints)
 
     def left_out(self, state: MultiviewState | None) -> tuple[Mask | None, ...]:
         """For each camera the pixels (H, W), at half size, that a state leaves out of the silhouettes; None for none."""
@@ -136,18 +138,19 @@ def fit_multiview(rng: np.random.Generator, survey: Survey, options: Options) ->
     smeared = float(np.mean([each.smeared for each in survey.silhouettes]))
     options = replace(options, multiview=for_smeared(options.multiview, smeared))
     training = None if recording.training is None else read_motion(recording.training)
-    return fit_in_views(rng, rig.cameras, survey.first.masks, options, rig.rate / options.every, recording.subject.height, training)
+    return fit_in_views(rng, rig.cameras, survey.first.masks, options, rig.rate / options.every, recording.subject.height, training,
+                        keypoints=survey.first.keypoints)
 
 
 def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Sequence[Sequence[Mask | None]], options: Options,
                  rate: float, height: float | None = None, training: JointTable | None = None,
-                 both_fronts: bool = True) -> MultiviewSubject:
+                 both_fronts: bool = True, keypoints: Sequence[Sequence[Keypoints | None]] = ()) -> MultiviewSubject:
     """Fit the person to `views`, masks by time and camera, and make the tracker for `rate` frames/s; `both_fronts` as in `estimate_sizes`.
-    Raises the errors of `fit_multiview`."""
+    `keypoints`: of the same times and cameras; empty without any. Raises the errors of `fit_multiview`."""
     settings = options.multiview
     hull = VisualHull(cameras, settings.hull)
     known = familiar(rng, options, training, settings.body, rate)
-    first = [(hull.points(masks), masks) for masks in views]
+    first = [FirstFrame(hull.points(masks), masks, keypoints[n] if keypoints else ()) for n, masks in enumerate(views)]
     height, seen, shared, begin = options.height or height, None, None, 0
     if options.person is not None:
         sizes, source = read_person(options.person, settings.body).sizes, str(options.person)
@@ -170,7 +173,7 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
                                   "frames": person.frames,
                                   "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
     tracker = MultiviewTracker(person.body, tuple(cameras), for_rate(settings, rate), prior, library,
-                               looks=looks_in(settings.patience, rate), carve=hull.points if settings.odd_camera else None)
+                               looks=looks_in(settings.patience, rate), carve=hull.points if settings.odd_camera else None, rate=rate)
     return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull, tracker=tracker,
                             doubts=(*_front_doubts(person.front), *(() if seen is None else _doubts(seen.height, person.overlap))),
                             front=person.front,
@@ -211,7 +214,7 @@ def known_person(rng: np.random.Generator, cameras: Sequence[Camera], options: O
     known, hull = familiar(rng, options, None, settings.body, rate), VisualHull(cameras, settings.hull)
     prior = known.prior if settings.method == "hybrid" else None
     tracker = MultiviewTracker(make_body(settings.body, person.sizes), tuple(cameras), for_rate(settings, rate), prior,
-                               known.poses if len(known.poses) else None, looks=looks_in(settings.patience, rate))
+                               known.poses if len(known.poses) else None, looks=looks_in(settings.patience, rate), rate=rate)
     return MultiviewSubject(body=tracker.body, person=person, summary=summary, hull=hull, tracker=tracker, is_measured=is_measured)
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import colour_codes
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask, Seen, half_size
 from shadowpuppet.errors import SettingsError, SilhouetteError, VideoError, warn
 from shadowpuppet.io.inputs.inputs import NO_INPUTS, Inputs, inputs_of
@@ -47,11 +48,12 @@ def unshared(found: Sequence[Segmented | None]) -> tuple[Mask | None, ...]:
     return tuple(None if each is None else each.mask for each in found)
 
 
-def shown_in(found: Sequence[Segmented | None], share: Share = unshared) -> Seen:
-    """What the silhouettes of a set's cameras show, with those masks that `share` makes of them."""
+def shown_in(found: Sequence[Segmented | None], share: Share = unshared, keypoints: tuple[Keypoints | None, ...] = ()) -> Seen:
+    """What the silhouettes of a set's cameras show, with those masks that `share` makes of them, and the keypoints found in its frames."""
     own, masks = unshared(found), share(found)
     shadows = tuple(None if each is None or each.shadow is None else half_size(each.shadow) for each in found)
-    return Seen(masks, shadows, own=() if all(map(operator.is_, own, masks)) else own)
+    return Seen(masks, shadows, own=() if all(map(operator.is_, own, masks)) else own,
+                keypoints=keypoints if any(each is not None for each in keypoints) else ())
 
 
 class FrameSet(NamedTuple):
@@ -209,7 +211,7 @@ def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = F
                 continue
             start = time.perf_counter()
             found = [part.segmented for part in parts]
-            seen = shown_in(found, share)
+            seen = shown_in(found, share, tuple(part.keypoints for part in parts))
             sharing = time.perf_counter() - start
             yield FrameSet(moment, tuple(part.image for part in parts), seen,
                            sum(part.decoding for part in parts), sum(part.segmenting for part in parts) + sharing,
@@ -223,6 +225,7 @@ class _Part(NamedTuple):
     segmented: Segmented | None
     decoding: float
     segmenting: float
+    keypoints: Keypoints | None
 
 
 class CameraReader:
@@ -254,7 +257,8 @@ class CameraReader:
         except SilhouetteError as error:
             best = found = None
             self.next, self.trouble = None, str(error)
-        return _Part(None if best is None else best.image, found, decoded - start, time.perf_counter() - decoded)
+        return _Part(None if best is None else best.image, found, decoded - start, time.perf_counter() - decoded,
+                     None if best is None else best.keypoints)
 
     def _pop(self) -> CameraFrame | None:
         frame = self.next

@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.colour_codes import ColourCode, thinned
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.rig import FrameSet, Rig
 
 SHARED = ("height", "distance", "fov", "calibration", "camera", "background", "masks", "region", "start", "end", "max_size",
-          "every", "people", "silhouette")
+          "every", "people", "silhouette", "evidence")
 """Options on which survey and silhouettes depend."""
 LIMIT = 256_000_000
 """Greatest size of the kept silhouettes, bytes: about half an hour of one camera's 25 frames/s at 320 x 240."""
@@ -45,9 +46,10 @@ class MaskStore:
     """Size of the stored masks, bytes."""
     complete: bool = False
     """Whether all frame sets of the recording are stored."""
-    sets: list[tuple[float, list[Packed | None], list[Packed | None], list[bytes | None]]] = field(default_factory=list)
-    """For each set its time (s) and, for each camera, `Seen.masks`, `Seen.own` and, where the mask is, `Seen.codes`; None for a camera
-    without them."""
+    sets: list[tuple[float, list[Packed | None], list[Packed | None], list[bytes | None], tuple[Keypoints | None, ...]]] = field(
+        default_factory=list)
+    """For each set its time (s) and, for each camera, `Seen.masks`, `Seen.own`, where the mask is, `Seen.codes`, and `Seen.keypoints`; None
+    for a camera without them."""
 
     def add(self, time: float, seen: Seen) -> None:
         """Store one frame set's masks, and the colours in them; not the shadows."""
@@ -57,9 +59,10 @@ class MaskStore:
         packed, alone = ([None if mask is None else (_compressed(np.packbits(mask)), mask.shape) for mask in each]
                          for each in (seen.masks, seen.own))
         colours = [None if mask is None or each is None else _compressed(each[thinned(mask)]) for mask, each in zip(seen.masks, seen.codes)]
-        self.sets.append((time, packed, alone, colours))
+        self.sets.append((time, packed, alone, colours, seen.keypoints))
         self.size += sum(len(one[0]) for one in (*packed, *alone) if one is not None)
         self.size += sum(len(one) for one in colours if one is not None)
+        self.size += sum(each.xy.nbytes + each.confidence.nbytes for each in seen.keypoints if each is not None)
 
     def __iter__(self) -> Iterator[FrameSet]:
         """The stored frame sets, without images."""
@@ -70,9 +73,9 @@ class MaskStore:
         yield from map(self._frame_set, reversed(range(len(self.sets))))
 
     def _frame_set(self, n: int) -> FrameSet:
-        time, packed, alone, colours = self.sets[n]
+        time, packed, alone, colours, keypoints = self.sets[n]
         masks = tuple(map(_unpacked, packed))
-        seen = Seen(masks, codes=tuple(map(_codes, masks, colours)), own=tuple(map(_unpacked, alone)))
+        seen = Seen(masks, codes=tuple(map(_codes, masks, colours)), own=tuple(map(_unpacked, alone)), keypoints=keypoints)
         return FrameSet(time, (None,) * len(packed), seen)
 
     def stored(self, frames: Iterable[FrameSet]) -> Generator[FrameSet]:

@@ -7,6 +7,7 @@ from functools import cache
 import actor
 import numpy as np
 import pytest
+from detector import EXACT, detected
 from scans import make_body as random_tree
 from scans import scan, some_pose
 
@@ -15,6 +16,8 @@ from shadowpuppet.body.models import shares_of
 from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.errors import ShadowPuppetError
+from shadowpuppet.tracking.keypoints.definitions import landmarks_of
+from shadowpuppet.tracking.keypoints.sights import Sights, sights_of
 from shadowpuppet.tracking.multiview import bundle_adjustment
 from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, make_cloud
@@ -324,3 +327,40 @@ def test_no_step_is_longer_than_it_may_be(monkeypatch):
     solve_bundle(anatomical, MEAN, SPREAD, near, far, rounds=2)
     longest = np.max(seen, 0)
     np.testing.assert_allclose(longest, [0.002, 0.02], rtol=1e-6)
+
+
+# Keypoints ------------------------------------------------------------------------------------------------------------
+
+
+def sights_to(body, pose) -> Sights:
+    marks = landmarks_of(body)
+    points = body.skeleton.points(pose[None], marks.joints, marks.places)
+    found = detected(np.random.default_rng(3), actor.cameras(), np.zeros(1), marks.names, points, EXACT)[0]
+    return sights_of(actor.cameras(), found, (0,) * len(found), marks, points[0].mean(0))
+
+
+def test_what_keypoints_say_of_pose_and_sizes_is_the_slope_of_their_cost():
+    long, pose = anatomical(actor.sizes(thigh_length=1.05, forearm_length=0.95)), actor.stance(actor.body().skeleton, 0.3)
+    sights, worth, K = sights_to(long, pose + 0.02), 2.0, [NAMES.index(name) for name in ("thigh_length", "forearm_length")]
+    empty, values = bundle_adjustment._Frame(0.0, 0.0, np.zeros((34, 34)), np.zeros(34)), MEAN.to_array()
+
+    def at(pose, values):
+        model = bundle_adjustment._model(anatomical(AnatomicalSizes.from_array(values)))
+        nudged = bundle_adjustment._nudged(anatomical, AnatomicalSizes, values, np.array(K))
+        return bundle_adjustment._sighted(empty, model, nudged, pose, sights, worth)
+
+    found, step = at(pose, values), 1e-5
+    slopes = [(at(pose + step * row, values).cost - at(pose - step * row, values).cost) / (2 * step) for row in np.eye(32)]
+    slopes += [(at(pose, values + step * row).cost - at(pose, values - step * row).cost) / (2 * step) for row in np.eye(len(NAMES))[K]]
+    np.testing.assert_allclose(-2 * found.gradient, slopes, rtol=0.02, atol=0.02 * np.abs(slopes).max())
+
+
+def test_bones_are_those_that_keypoints_show():
+    true = actor.sizes(thigh_length=1.08, upper_arm_length=0.94)
+    poses = actor.walk(anatomical(true).skeleton, 3)
+    nothing = make_cloud(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+    rays = [(sights_to(anatomical(true), pose), 2e-6) for pose in poses]
+    alone, found = (solve_bundle(anatomical, MEAN, SPREAD, poses, [nothing] * 3, rays=seen).sizes for seen in ((), rays))
+    assert alone == MEAN
+    for name in ("thigh_length", "upper_arm_length", "shank_length"):
+        assert getattr(found, name) == pytest.approx(getattr(true, name), abs=0.006)

@@ -8,13 +8,16 @@ from functools import partial
 import actor
 import numpy as np
 import pytest
+from detector import EXACT, detected
 
 from shadowpuppet.body.anthropometry import SOLE, stature_of
 from shadowpuppet.body.models import WHOLE, average_sizes, make_body, shares_of
 from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.errors import TrackingError
+from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.multiview import size_estimation
+from shadowpuppet.tracking.multiview.height_estimation import FirstFrame
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.size_estimation import (
     CLOTHES,
@@ -121,9 +124,9 @@ def test_who_is_found_in_a_later_frame_is_followed_back_to_the_first():
     first, seen = stout()[2], []
 
     class Watched(MultiviewTracker):
-        def start(self, rng, points, masks, also=None, facing=None):
+        def start(self, rng, points, masks, **more):
             seen.append(masks)
-            return super().start(rng, points, masks, also, facing)
+            return super().start(rng, points, masks, **more)
 
     tracker = Watched(anatomical(stout()[0]), tuple(actor.cameras()), SETTINGS)
     found = size_estimation._followed(np.random.default_rng(0), tracker, first, 3, None)
@@ -155,6 +158,34 @@ def test_a_body_that_faces_the_wrong_way_at_first_is_measured_both_ways(monkeypa
     assert found.front.heading_in(first[0][0]) == found.front.heading
     assert found.front.heading_in(first[1][0]) is None
     assert asked[0] is None
+
+
+def with_keypoints(exchanged: tuple[int, ...] = ()) -> list[FirstFrame]:
+    """The first frames with keypoints, in some of them with left for right in all cameras."""
+    true, poses, first = stout()
+    body = anatomical(true)
+    marks = landmarks_of(body)
+    joints = body.skeleton.points(poses, marks.joints, marks.places)
+    joints[list(exchanged)] = joints[list(exchanged)][:, marks.mirrored]
+    found = detected(np.random.default_rng(0), actor.cameras(), np.arange(len(poses)) / 20, marks.names, joints, EXACT)
+    return [FirstFrame(*frame, seen) for frame, seen in zip(first, found, strict=True)]
+
+
+@pytest.mark.parametrize("exchanged", [(), (2,)])
+def test_the_front_that_keypoints_show_together_is_searched_for_and_no_other(monkeypatch, exchanged):
+    true, poses, _ = stout()
+    search, asked = MultiviewTracker.search, list[float | None]()
+
+    def watched(self, rng, observation, facing=None):
+        asked.append(facing)
+        return search(self, rng, observation, facing)
+
+    monkeypatch.setattr(MultiviewTracker, "search", watched)
+    monkeypatch.setattr(size_estimation, "ALIKE", np.inf)
+    found = measured(np.zeros(len(NAMES)), with_keypoints(exchanged), true)
+    assert found.front is None
+    assert None not in asked
+    assert np.cos(np.array(asked) - size_estimation.heading_of(actor.body(), poses[0])).min() > 0.9
 
 
 def test_a_front_is_known_in_its_own_frame_only():

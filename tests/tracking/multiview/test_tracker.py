@@ -10,17 +10,22 @@ from dataclasses import replace
 import actor
 import numpy as np
 import pytest
+from detector import detected
 
+from shadowpuppet.body.skeleton import other_side
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import fit_prior
+from shadowpuppet.tracking.keypoints.definitions import landmarks_of
+from shadowpuppet.tracking.multiview import pose_search
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings, make_multiview_settings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.tracking.particle_filter import evaluate
+from shadowpuppet.tracking.particle_filter import evaluate, gathered
 from shadowpuppet.tracking.resampling import normalise
 
 FEW = {"particles": 8}
@@ -403,3 +408,61 @@ def test_a_prior_of_another_body_is_refused():
 
 def test_a_tracker_without_settings_is_the_default():
     assert MultiviewTracker(actor.body(), actor.cameras()).settings == MultiviewSettings() == make_multiview_settings()
+
+
+# Keypoints ------------------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def found_in(frames: int = 12) -> list[list[Keypoints]]:
+    marks, poses = landmarks_of(actor.body()), actor.filmed(frames=frames)[0]
+    joints = actor.body().skeleton.points(poses, marks.joints, marks.places)
+    return detected(np.random.default_rng(1), actor.cameras(), np.arange(frames) / 20, marks.names, joints)
+
+
+def turned_round(pose: np.ndarray) -> np.ndarray:
+    """The same place and posture, facing the other way."""
+    out = pose[other_side(NAMES)]
+    out[NAMES.index("root_heading")] += np.pi
+    return out
+
+
+def test_with_keypoints_a_walk_is_followed_at_least_as_well():
+    poses, seen = actor.filmed()
+    of = tracker()
+    rng, states = np.random.default_rng(0), []
+    for frame, keypoints in zip(seen, found_in()):
+        states.append(of.step(rng, states[-1], *frame, keypoints=keypoints) if states else of.start(rng, *frame, keypoints=keypoints))
+    assert np.median(errors(of, states, poses)) < 0.015
+
+
+def test_a_search_is_about_the_front_that_keypoints_show(monkeypatch):
+    of, asked = tracker(), []
+    monkeypatch.setattr(pose_search, "search", lambda *args: asked.append(args[-1]) or evaluate(actor.filmed()[0][:8], args[5]))
+    monkeypatch.setattr("shadowpuppet.tracking.recovery.SETTLE_CYCLES", 0)
+    points, masks = actor.filmed()[1][0]
+    of.start(np.random.default_rng(0), points, masks)
+    of.start(np.random.default_rng(0), points, masks, keypoints=found_in()[0])
+    of.start(np.random.default_rng(0), points, masks, facing=1.0, keypoints=found_in()[0])
+    assert asked[0] is None
+    assert np.cos(asked[1] - actor.filmed()[0][0, NAMES.index("root_heading")]) > 0.9
+    assert asked[2] == 1.0
+
+
+def test_a_body_that_is_turned_round_turns_back_once_keypoints_are_certain_of_it():
+    poses, seen = actor.filmed()
+    of = replace(tracker(), rate=4.0)
+    pose = turned_round(poses[0])
+    state = MultiviewState(pose, 0 * pose, gathered(pose, of.number), 0.0, 0.9, "tracked")
+    at = NAMES.index("root_heading")
+    alone = of.step(np.random.default_rng(0), state, *seen[1])
+    assert np.cos(alone.pose[at] - poses[1, at]) < 0
+    found = of.step(np.random.default_rng(0), state, *seen[1], keypoints=found_in()[1])
+    assert np.cos(found.pose[at] - poses[1, at]) > 0
+    assert actor.apart(of.body, found.pose, poses[1])[0] < 0.03
+
+
+def test_presets_of_the_paper_and_no_weight_leave_keypoints_out():
+    _, seen = actor.filmed("cylinders")
+    for of in (tracker("ni2008", "cylinders"), tracker(keypoints=0.0)):
+        assert of.observe(track(of, seen[:1])[0], *seen[1], keypoints=found_in()[1]).keypoints is None

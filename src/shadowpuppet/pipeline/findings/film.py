@@ -92,7 +92,8 @@ def of_several(film: FilmSurvey) -> FilmSurvey:
 def _made(sample: Sample, silhouettes: Silhouettes) -> tuple[Silhouettes, list[list[Mask]]]:
     """Silhouettes, with the sample's frames classified, and their masks of its runs."""
     if silhouettes.segmenter is not None and not silhouettes.classified:
-        silhouettes.classified.update((id(image), (image, silhouettes.segmenter.labelled(image))) for _, image, _ in sample.frames)
+        images = (frame.image for frame in sample.frames)
+        silhouettes.classified.update((id(image), (image, silhouettes.segmenter.labelled(image))) for image in images)
     return silhouettes, [[silhouettes(frame) for frame in run] for run in sample.runs]
 
 

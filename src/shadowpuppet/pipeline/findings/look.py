@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from shadowpuppet.calibration.agreement import Agreement
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.errors import Finding
 from shadowpuppet.pipeline.findings.keypoints import KeypointsLook
@@ -145,6 +146,8 @@ class FirstSeconds(NamedTuple):
     """With one camera: masks of moments spread over the whole film, as `masks`."""
     shadows: Sequence[tuple[Mask | None, ...]] = ()
     """With several: what was taken for shadow, as in `Seen`, for each time."""
+    keypoints: Sequence[tuple[Keypoints | None, ...]] = ()
+    """With several: what detectors found, likewise; empty without any."""
 
     def seen(self, n: int) -> Seen:
         """What the cameras show at time `n`."""

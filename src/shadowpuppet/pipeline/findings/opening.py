@@ -58,7 +58,8 @@ def _segmented(rig: Rig, silhouettes: Sequence[Silhouettes], sets: Sequence[tupl
 
     found = MadeOnDemand(seen, number)
     return FirstSeconds([frames[rig.leaders[0]].time for frames in sets], MadeOnDemand(lambda n: found[n].masks, number),
-                        shadows=MadeOnDemand(lambda n: found[n].shadows, number))
+                        shadows=MadeOnDemand(lambda n: found[n].shadows, number),
+                        keypoints=[tuple(frame.keypoints for frame in frames) for frames in sets])
 
 
 def _read_sets(rig: Rig, silhouettes: Sequence[Silhouettes], opening: Opening, ready: bool) -> FirstSeconds:
@@ -68,4 +69,5 @@ def _read_sets(rig: Rig, silhouettes: Sequence[Silhouettes], opening: Opening, r
                                      threads=usable_cores(), share=SharedShadows(rig.cameras))
         sets = [(each.time, each.seen) for each in islice(frames, opening.number)]
     sets = [each for each in sets if each[0] <= rig.recording.begin + opening.seconds] or sets[:1]
-    return FirstSeconds([time for time, _ in sets], [seen.masks for _, seen in sets], shadows=[seen.shadows for _, seen in sets])
+    return FirstSeconds([time for time, _ in sets], [seen.masks for _, seen in sets], shadows=[seen.shadows for _, seen in sets],
+                        keypoints=[seen.keypoints for _, seen in sets])

@@ -17,6 +17,9 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import Sizes
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
+from shadowpuppet.tracking.keypoints.definitions import landmarks_of
+from shadowpuppet.tracking.keypoints.likelihood import pulls, surprises
+from shadowpuppet.tracking.keypoints.sights import Sights
 from shadowpuppet.tracking.multiview.refinement.correspondence import (
     LANES,
     Cloud,
@@ -55,14 +58,14 @@ class Bundle(Generic[Measured]):
 def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array, poses: Array, clouds: Sequence[Cloud],
                  settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float | Array = 1e-6, centre: Array | None = None,
                  first: Measured | None = None, worth: float = INDEPENDENT_POINTS, shared: Array | None = None,
-                 spaces: Sequence[FreeSpace] = (), emptiness: float = 0.0) -> Bundle[Measured]:
+                 spaces: Sequence[FreeSpace] = (), emptiness: float = 0.0, rays: Sequence[tuple[Sights, float]] = ()) -> Bundle[Measured]:
     """Sizes and poses that fit the surface points of F frames, by damped Gauss-Newton from poses (F, D) and sizes `first` or `expected`.
 
     `spread`: standard deviations (m) of the expected sizes, (K,), or (2, K) for sizes that are smaller and larger than expected; 0 for
     fixed ones. `shared` (S, K): deviations that sizes have together, each row for one standard deviation of a common cause, such as the
     stature. `spaces`, one per frame, and `emptiness`: silhouettes that limbs must not reach out of, as in `Pass`. `pull`, one or (F, D):
     weight of the squared distance from `centre` (F, D; default: `poses`), as in `Refiner.gauss_newton`. `worth`: effective number of
-    independent points per frame.
+    independent points per frame. `rays`, one per frame: to the person's landmarks, and what a nat of their surprise costs, m^2.
     """
     settings, start, about = settings or SurfaceSettings(), poses if centre is None else centre, expected.to_array()
     pull = np.broadcast_to(pull, poses.shape)
@@ -76,6 +79,8 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
         model, nudged = _model(body, lengths), _nudged(make, type(expected), at[0], free, lengths)
         frames = [_equations(model, nudged, pose, cloud, settings, space, emptiness)
                   for pose, cloud, space in zip(at[1], clouds, spaces or [None] * len(clouds), strict=True)]
+        if rays:
+            frames = [_sighted(frame, model, nudged, pose, *seen) for frame, pose, seen in zip(frames, at[1], rays, strict=True)]
         off = (at[0] - about)[free]
         tight = np.where(off[:, None] < 0, smaller, larger)
         cost = scale * (sum(frame.cost for frame in frames) + (pull * (at[1] - start) ** 2).sum()) + off @ tight @ off
@@ -112,6 +117,7 @@ class _Model(NamedTuple):
     """Those that must not reach out of silhouettes, if any are given."""
     reach: NDArray[np.bool_]
     """Whether a DOF moves a joint, of shape (D, J)."""
+    body: Body
 
 
 def _lengths(body: Body) -> Array:
@@ -130,7 +136,8 @@ def _model(body: Body, lengths: Array | None = None) -> _Model:
             above[:, j] |= above[:, parent]
     chain = make_chain(skeleton)
     return _Model(chain, limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts), part_constants(limbs),
-                  None if lengths is None else spheres_in(limbs, lengths), above[chain.owners])
+                  None if lengths is None else spheres_in(limbs, lengths), above[chain.owners],
+                  body)
 
 
 class _Frame(NamedTuple):
@@ -216,6 +223,35 @@ def _within(frame: _Frame, model: _Model, nudged: list[_Model], pose: Array, scr
     weighed = rows * weights[:, None]
     return frame._replace(cost=frame.cost + float(out[8].sum()), rows=frame.rows + rows.T @ weighed,
                           gradient=frame.gradient + weighed.T @ distances)
+
+
+def _sighted(frame: _Frame, model: _Model, nudged: list[_Model], pose: Array, sights: Sights, worth: float) -> _Frame:
+    """A frame's equations with those of landmarks that are seen on rays: two rows a ray, across it."""
+    if not sights.size:
+        return frame
+    marks, (places, screws) = landmarks_of(model.body), _landmarks(model, pose)
+    chosen, pull = pulls(places, sights, marks)
+
+    def away(places: Array) -> Array:
+        """Distances (2 M,) from the landmarks to the rays, along both directions across."""
+        return np.einsum("mij,mj->mi", sights.across, sights.origins - places[chosen]).ravel()
+
+    distances, weights, normals = away(places), worth * pull.repeat(2), sights.across.reshape(-1, 3)
+    points, reach = places[chosen].repeat(2, 0), model.reach[:, marks.joints[chosen].repeat(2)].T
+    moves = (np.concatenate([np.cross(points, normals), normals], 1) @ screws.T) * reach
+    grows = [(distances - away(_landmarks(other, pose)[0])) / SIZE_STEP for other in nudged]
+    rows = np.concatenate([moves, np.transpose(grows).reshape(len(moves), len(nudged))], 1)
+    weighed = rows * weights[:, None]
+    cost = worth * float(surprises(places[None], sights, marks)[0])
+    return frame._replace(cost=frame.cost + cost, rows=frame.rows + rows.T @ weighed, gradient=frame.gradient + weighed.T @ distances)
+
+
+def _landmarks(model: _Model, pose: Array) -> tuple[Array, Array]:
+    """Places (K, 3) of the landmarks of a pose (D,), world, and the screws (D, 6) of its DOF."""
+    T, screws, marks = np.zeros((len(model.chain.parents), 3, 4)), np.zeros((len(pose), 6)), landmarks_of(model.body)
+    place_one(pose, model.chain, T, screws, np.zeros((3, 3, 3)))
+    own = T[marks.joints]
+    return np.einsum("kij,kj->ki", own[..., :3], marks.places) + own[..., 3], screws
 
 
 def _reaching(model: _Model, pose: Array, space: FreeSpace, emptiness: float, origin: Array) -> Array:

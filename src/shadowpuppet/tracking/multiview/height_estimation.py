@@ -16,6 +16,7 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import HEIGHTS
 from shadowpuppet.body.skeleton import bounded
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
@@ -36,8 +37,24 @@ men together; it grows with the square, and is bounded for the sake of children.
 LEAST_POINTS, STRAY = 50, 2
 """Least number of surface points of a person; number of points at each end of an extent that may be noise."""
 
-First = Sequence[tuple[SurfacePoints, Sequence[Mask | None]]]
-"""Surface points of frames, and the masks that they were made from, one per camera."""
+
+class FirstFrame(NamedTuple):
+    """One of the first frames."""
+
+    points: SurfacePoints
+    masks: Sequence[Mask | None]
+    """The masks (H, W) that the points were made from, one per camera."""
+    keypoints: Sequence[Keypoints | None] = ()
+    """What a detector found, one per camera; empty without one."""
+
+
+First = Sequence[FirstFrame | tuple[SurfacePoints, Sequence[Mask | None]]]
+"""Frames in order of time, without keypoints also as pairs."""
+
+
+def first_frames(first: First) -> list[FirstFrame]:
+    """All of them with keypoints or none."""
+    return [each if isinstance(each, FirstFrame) else FirstFrame(each[0], each[1]) for each in first]
 
 
 class SeenHeight(NamedTuple):
@@ -78,9 +95,10 @@ def estimate_height(rng: np.random.Generator, make: Callable[[float], Body], cam
     return SeenHeight(begin * RATIO ** (at + lowest_point(cost(at - 1), cost(at), cost(at + 1))), int(chosen[int(tried[at].argmin())]))
 
 
-def _misfit(rng: np.random.Generator, tracker: MultiviewTracker, points: SurfacePoints, masks: Sequence[Mask | None]) -> float:
+def _misfit(rng: np.random.Generator, tracker: MultiviewTracker, points: SurfacePoints, masks: Sequence[Mask | None],
+            keypoints: Sequence[Keypoints | None] = ()) -> float:
     """Cost (m^2) of the pose found in a frame; infinite if there is no person."""
-    state = tracker.start(rng, points, masks)
+    state = tracker.start(rng, points, masks, keypoints=keypoints)
     if state.status == "absent":
         return np.inf
     return state.cost + OUTSIDE * MultiviewObservation(tracker.views, points, masks).outside(state.pose)
@@ -95,7 +113,7 @@ def lowest_point(before: float, here: float, after: float) -> float:
 def longest_extent(first: First) -> float | None:
     """The longest extent of the frames' surface points along their principal axes, metres, of 9 in 10 frames; None without points."""
     extents = list[float]()
-    for points, _ in first:
+    for points, *_ in first:
         if len(points.points) > LEAST_POINTS:
             middle = points.points - points.points.mean(0)
             along = np.sort(middle @ np.linalg.svd(middle, full_matrices=False)[2].T, axis=0)

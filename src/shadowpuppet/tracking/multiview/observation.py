@@ -16,6 +16,8 @@ from shadowpuppet.camera.projection import make_lens, pixel_nearest
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
+from shadowpuppet.tracking.keypoints.sights import NO_SIGHTS, Sights
+from shadowpuppet.tracking.multiview.keypoint_evidence import KeypointEvidence
 from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, make_cloud
 from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, free_space, reach, spheres_in
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
@@ -61,6 +63,7 @@ class MultiviewObservation:
         self.views, self.masks, self.also = views, masks, also
         self.left_out = tuple(left_out) or (None,) * len(masks)
         self.around, self._known_halves = around, halves
+        self.keypoints: KeypointEvidence | None = None
         self.surface = _without(surface, views, self.left_out)
 
     def cloud(self, share: int = 1) -> Cloud:
@@ -75,7 +78,12 @@ class MultiviewObservation:
 
     @cached_property
     def _origin(self) -> Array:
-        return self.surface.points.mean(0) if len(self.surface.points) else np.zeros(3)
+        return middle_of(self.surface)
+
+    @property
+    def rays(self) -> tuple[Sights, float]:
+        """Rays to the person's landmarks, none without keypoints; and what a nat of their surprise costs, m^2."""
+        return (NO_SIGHTS, 0.0) if self.keypoints is None else self.keypoints.rays
 
     @cached_property
     def seen(self) -> tuple[int, ...]:
@@ -134,6 +142,11 @@ class MultiviewObservation:
         """Intersection over union of a drawn pose (D,) and the silhouettes, mean of all pictures; 0 without silhouettes."""
         overlaps = self.overlaps(pose)[list(self.seen)]
         return float(np.mean(overlaps)) if len(overlaps) else 0.0
+
+
+def middle_of(surface: SurfacePoints) -> Array:
+    """Mean (3,) of surface points, world; the origin without any."""
+    return surface.points.mean(0) if len(surface.points) else np.zeros(3)
 
 
 def _without(surface: SurfacePoints, views: BodyInViews, left_out: Sequence[Bits | None]) -> SurfacePoints:

@@ -42,7 +42,7 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
     """The `number` best poses (number, D) for a frame's surface points, with the costs and weights of `weigh`.
 
     `library`: initial poses (L, D); their position and heading are ignored. `facing`: heading (rad) from which poses begin less than a
-    quarter turn away; None: in all headings.
+    quarter turn away; None: in all headings. The poses that keypoints show are refined however far they are from the points.
     """
     postures = usual_postures(body.skeleton)
     known = np.asarray([] if library is None else library, float)
@@ -52,10 +52,11 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
         postures = np.concatenate([known, postures])
     poses = place_postures(body, postures, observation.full.origin)
     poses = np.concatenate([poses, stood(body, poses, _lowest(observation.surface.points))])
-    if facing is not None:
-        poses = poses[np.cos(poses[:, heading_column(body.skeleton)] - facing) > 1e-6]
     share, _, tau = COARSE_STAGES[0]
+    poses = _towards(body, poses, facing)
     poses = poses[refiner.costs(poses, observation.cloud(share), tau).argsort(kind="stable")[:COARSE_CANDIDATES]]
+    if observation.keypoints is not None:
+        poses = np.concatenate([poses, _towards(body, observation.keypoints.either_way, facing)])
     poses = best_of((evaluate(_refined(refiner, observation, poses, COARSE_STAGES), weigh),), FINE_CANDIDATES).poses
     found = best_of((evaluate(_refined(refiner, observation, poses, FINE_STAGES), weigh),), number)
     for _, side in product(range(ARM_ROUNDS), ("left", "right")):
@@ -65,8 +66,14 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
     return found
 
 
+def _towards(body: Body, poses: Array, facing: float | None) -> Array:
+    """Those of poses (N, D) that face less than a quarter turn away from a heading (rad); None: all."""
+    return poses if facing is None else poses[np.cos(poses[:, heading_column(body.skeleton)] - facing) > 1e-6]
+
+
 def _refined(refiner: Refiner, observation: MultiviewObservation, poses: Array, stages: tuple) -> Array:
-    passes = tuple(Pass(observation.cloud(share), iterations, tau, observation.space, EMPTINESS) for share, iterations, tau in stages)
+    passes = tuple(Pass(observation.cloud(share), iterations, tau, observation.space, EMPTINESS, *observation.rays)
+                   for share, iterations, tau in stages)
     return refiner.gauss_newton(poses, passes, poses, np.full(poses.shape[1], PULL))
 
 

@@ -19,10 +19,12 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes, Sizes
 from shadowpuppet.body.whole_body import heading_column
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array, evenly_spread
+from shadowpuppet.tracking.keypoints.sights import NO_SIGHTS
 from shadowpuppet.tracking.multiview.bundle_adjustment import Measured, solve_bundle
+from shadowpuppet.tracking.multiview.height_estimation import FRAMES, First, FirstFrame, first_frames
+from shadowpuppet.tracking.multiview.keypoint_evidence import opening_heading
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
@@ -140,16 +142,18 @@ def _is_width(kind: type[Sizes]) -> NDArray[np.bool_]:
 
 
 def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], expected: Measured, spread: Array, cameras: Sequence[Camera],
-            first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], settings: MultiviewSettings,
+            first: First, settings: MultiviewSettings,
             library: Array | None = None, looks: int = 0, shared: Array | None = None, begin: int = 0,
             both_fronts: bool = True) -> SizeEstimate[Measured]:
-    """Sizes of the person in the `first` frames (surface points and masks, in order of time), `expected` with standard deviations `spread`
+    """Sizes of the person in the `first` frames, `expected` with standard deviations `spread`
     and `shared` as in `solve_bundle`. `looks`: number of frames after which what the body does not explain is left out; 0: never. `begin`:
     frame in which the person is searched for. Raises `TrackingError` if no person is found.
 
     Silhouettes of a person who stands upright hardly distinguish front and back. With `both_fronts`, where a body that faces the other way
-    fits nearly as well, the person is measured facing that way, too, and what fits better is kept; not with cylinders, which have no front.
+    fits nearly as well, the person is measured facing that way, too, and what fits better is kept; not with cylinders, which have no
+    front. A front of which the frames' keypoints are certain is the front.
     """
+    first = first_frames(first)
     plain = replace(settings, method="hybrid", refinement="gauss_newton")
 
     def followed(rng: np.random.Generator, sizes: Measured, facing: float | None) -> tuple[MultiviewTracker, list[Found]]:
@@ -165,14 +169,17 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
                 break
             chosen = evenly_spread(len(found), MAX_FRAMES)
             poses = np.array([found[i][1].pose for i in chosen])
-            seen = [MultiviewObservation(tracker.views, *first[found[i][0]]) for i in chosen]
+            frames = [first[found[i][0]] for i in chosen]
+            seen = [MultiviewObservation(tracker.views, each.points, each.masks) for each in frames]
+            shown = [tracker.shown(*each, last=pose) for each, pose in zip(frames, poses, strict=True)]
             clouds = [each.cloud(POINT_STRIDE) for each in seen]
             pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
             centre, pull = map(np.array, zip(*pulls, strict=True))
             bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
                                   worth=INDEPENDENT_POINTS[settings.body], shared=shared,
                                   spaces=() if shared is None else [each.space for each in seen],
-                                  emptiness=EMPTINESS_SHARE * settings.gauss_newton.emptiness)
+                                  emptiness=EMPTINESS_SHARE * settings.gauss_newton.emptiness,
+                                  rays=[(NO_SIGHTS, 0.0) if each is None else each.rays for each in shown])
             sizes, residual = bundle.sizes, bundle.residual
         tracker, found = followed(rng, sizes, facing)
         if not found:
@@ -181,14 +188,15 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
         return SizeEstimate(sizes, tracker.body, residual, float(np.mean([state.overlap for _, state in found])), len(found), last.pose,
                             last.unexplained), tracker, found
 
-    best = measured(rng)
+    front = _shown_front(MultiviewTracker(make(expected), tuple(cameras), plain), first, begin)
+    best = measured(rng, front)
     if best is None:
         raise TrackingError(f"nobody is found in the first {len(first)} frames' silhouettes: are they a whole person's, in two cameras or "
                             "more at once, and do the cameras agree? `shadowpuppet info` tells")
     other = rng.spawn(1)[0]  # the numbers drawn afterwards do not depend on whether a front is tried
     estimate, tracker, found = best
     about = min(found, key=lambda each: abs(each[0] - begin))
-    facing = _other_front(other, tracker, first, *about) if both_fronts and settings.body != "cylinders" else None
+    facing = _other_front(other, tracker, first, *about) if both_fronts and front is None and settings.body != "cylinders" else None
     turned = None if facing is None else measured(other, facing)
     if turned is None:
         return estimate
@@ -199,12 +207,20 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
     return replace(estimate, front=Front(heading_of(estimate.body, state.pose), middle, max(costs) / min(costs) - 1))
 
 
-def _other_front(rng: np.random.Generator, tracker: MultiviewTracker, first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]],
-                 index: int, state: MultiviewState) -> float | None:
+def _shown_front(tracker: MultiviewTracker, first: Sequence[FirstFrame], begin: int) -> float | None:
+    """The heading (rad) in frame `begin` if the keypoints of the first frames are certain of the front; None if they are not."""
+    looks = (tracker.shown(*first[n]) for n in evenly_spread(len(first), FRAMES))  # neighbouring ones are wrong together
+    now = tracker.shown(*first[begin])
+    return None if now is None else opening_heading([each for each in looks if each is not None], now)
+
+
+def _other_front(rng: np.random.Generator, tracker: MultiviewTracker, first: Sequence[FirstFrame], index: int,
+                 state: MultiviewState) -> float | None:
     """The opposite heading (rad) of a state found in frame `index`, if a body that faces that way fits the frame nearly as well; None if it
     does not."""
     facing = heading_of(tracker.body, state.pose) + np.pi
-    turned = tracker.start(rng, *first[index], facing=facing)
+    points, masks, keypoints = first[index]
+    turned = tracker.start(rng, points, masks, facing=facing, keypoints=keypoints)
     is_turned = np.cos(heading_of(tracker.body, turned.pose) - facing) > 0  # otherwise it has turned back while it was fitted
     return facing if is_turned and turned.cost <= ALIKE * state.cost else None
 
@@ -214,19 +230,25 @@ def heading_of(body: Body, pose: Array) -> float:
     return float(pose[heading_column(body.skeleton)])
 
 
-def _followed(rng: np.random.Generator, tracker: MultiviewTracker,
-              first: Sequence[tuple[SurfacePoints, Sequence[Mask | None]]], begin: int, facing: float | None) -> list[Found]:
+def _followed(rng: np.random.Generator, tracker: MultiviewTracker, first: First, begin: int, facing: float | None) -> list[Found]:
     """The frames in which the person is found: searched for in the frame `begin`, as facing a heading (rad) or any way, followed from there
     back to the first one and then through all, and searched for again if the overlap falls."""
-    state, found, best = None, list[Found](), 0.0
-    for points, masks in first[begin:0:-1]:
-        state = tracker.start(rng, points, masks, facing=facing) if state is None else tracker.step(rng, state, points, masks)
+    state, found, best, frames = None, list[Found](), 0.0, first_frames(first)
+
+    def begun(frame: FirstFrame) -> MultiviewState:
+        return tracker.start(rng, frame.points, frame.masks, facing=facing, keypoints=frame.keypoints)
+
+    def stepped(state: MultiviewState | None, frame: FirstFrame) -> MultiviewState:
+        return begun(frame) if state is None else tracker.step(rng, state, frame.points, frame.masks, keypoints=frame.keypoints)
+
+    for frame in frames[begin:0:-1]:
+        state = stepped(state, frame)
     state = None if state is None else state._replace(velocity=np.zeros_like(state.velocity), unexplained=())
-    for n, (points, masks) in enumerate(first):
-        state = tracker.start(rng, points, masks, facing=facing) if state is None else tracker.step(rng, state, points, masks)
+    for n, frame in enumerate(frames):
+        state = stepped(state, frame)
         if state.overlap < best - OVERLAP_LOSS and state.status != "absent":
             facing = None if facing is None else heading_of(tracker.body, state.pose)
-            again = tracker.start(rng, points, masks, facing=facing)._replace(unexplained=state.unexplained)
+            again = begun(frame)._replace(unexplained=state.unexplained)
             state = min(state, again, key=lambda each: each.cost)
         best = max(best, state.overlap)
         if state.status in ("tracked", "uncertain"):

@@ -14,14 +14,18 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.camera.bits import pack
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import ColourCode
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask, half_size
 from shadowpuppet.geometry import Array
+from shadowpuppet.motion.motion import BLANK
 from shadowpuppet.motion.prior.local_pca import Regions
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
+from shadowpuppet.tracking.keypoints.front import CERTAIN
 from shadowpuppet.tracking.multiview import arm_postures, body_postures, pose_search
 from shadowpuppet.tracking.multiview.arms_in_views import ArmsInViews, Counts
+from shadowpuppet.tracking.multiview.keypoint_evidence import KeypointEvidence, keypoint_evidence
 from shadowpuppet.tracking.multiview.local_search import LocalSearch
-from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation
+from shadowpuppet.tracking.multiview.observation import BodyInViews, MultiviewObservation, middle_of
 from shadowpuppet.tracking.multiview.posture_prior import PosturePrior
 from shadowpuppet.tracking.multiview.proposals import Proposals
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refine, Refiner
@@ -72,6 +76,8 @@ class MultiviewState(NamedTuple):
     """The colours that have been seen on the arms and elsewhere, by camera."""
     regions: Regions | None = None
     """The motion prior's region drawn for each particle (N,); None where it is the one nearest to the pose."""
+    against: float = 0.0
+    """Log odds of keypoints in the last frames against the way that the body faces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,17 +100,21 @@ class MultiviewTracker:
     """Number of frames after which parts of the silhouettes that the body does not explain are left out; 0: never."""
     carve: Callable[[Sequence[Mask | None]], SurfacePoints] | None = None
     """Surface points of masks (H, W), one per camera: computed again without a camera that contradicts the others; None: all count."""
+    rate: float = 30.0
+    """Frames/s: keypoints of half a second are wrong together."""
 
     def step(self, rng: np.random.Generator, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
-             also: Cost | None = None, codes: Sequence[ColourCode | None] = ()) -> MultiviewState:
+             also: Cost | None = None, codes: Sequence[ColourCode | None] = (),
+             keypoints: Sequence[Keypoints | None] = ()) -> MultiviewState:
         """The state after a new frame's surface points, and the masks (H, W) that they were made from, one per camera.
 
         If no person is visible the pose is held; after a loss the person is searched for (`recover`). `also`: a cost of your own, poses
         (N, D) to m^2 (N,), added to that of the surface. `codes`: the pictures' colours (`colour_codes`), one array per camera, if the arms
-        may be found by them.
+        may be found by them. `keypoints`: what a detector found in the pictures, pixels of the cameras' size, one per camera.
         """
-        observation = self.observe(state, points, masks, also, codes)
+        observation = self.observe(state, points, masks, also, codes, keypoints)
         found = self.follow(rng, state, observation)
+        found = self._faced(rng, state, found, observation)
         if self.carve is not None:
             found = self._without_odd_one(rng, state, found, observation)
         found = found._replace(unexplained=self.unexplained(state.unexplained, masks, found)) if self.looks else found
@@ -119,6 +129,7 @@ class MultiviewTracker:
         for n in suspects(usual, now):
             rest = [None if m == n else mask for m, mask in enumerate(masks)]
             without = MultiviewObservation(self.views, self.carve(rest), rest, observation.also, observation.left_out)
+            without.keypoints = None if observation.keypoints is None else observation.keypoints.without(n)
             states[n] = self.follow(rng, state, without)
             overlaps[n] = observation.overlaps(states[n].pose)
         odd = odd_one(usual, now, overlaps)
@@ -133,21 +144,43 @@ class MultiviewTracker:
             cycle=lambda state: self.cycle(rng, state, observation), search=lambda: self.search(rng, observation))  # fmt: skip
 
     def start(self, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None],
-              also: Cost | None = None, facing: float | None = None) -> MultiviewState:
+              also: Cost | None = None, facing: float | None = None, keypoints: Sequence[Keypoints | None] = ()) -> MultiviewState:
         """A state from one frame's points and masks (H, W), as `search` finds it, or `absent`. Arguments as in `step` and `search`."""
         observation = MultiviewObservation(self.views, points, masks, also)
+        observation.keypoints = self.shown(points, masks, keypoints)
         if self.is_present(observation):
             return self.search(rng, observation, facing)
         rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))
         return MultiviewState(rest[0], 0 * rest[0], Particles(rest, np.zeros(1), np.zeros(1)), np.nan, 0.0, "absent")
 
     def observe(self, state: MultiviewState, points: SurfacePoints, masks: Sequence[Mask | None],
-                also: Cost | None = None, codes: Sequence[ColourCode | None] = ()) -> MultiviewObservation:
+                also: Cost | None = None, codes: Sequence[ColourCode | None] = (),
+                keypoints: Sequence[Keypoints | None] = ()) -> MultiviewObservation:
         """The observation of a frame's masks (H, W) after `state`, without what is left out beside its pose. Arguments as in `step`."""
         also = self._with_arms(also, state, masks, codes)
         beside = [None if each is None else each.beside(picture.mask(state.pose))
                   for each, picture in zip(state.unexplained, self.views.pictures)]
-        return MultiviewObservation(self.views, points, masks, also, [None if pixels is None else pack(pixels) for pixels in beside])
+        out = [None if pixels is None else pack(pixels) for pixels in beside]
+        observation = MultiviewObservation(self.views, points, masks, also, out)
+        last = None if state.status in BLANK else state.pose
+        observation.keypoints = self.shown(points, masks, keypoints, last)
+        return observation
+
+    def shown(self, points: SurfacePoints, masks: Sequence[Mask | None],
+              keypoints: Sequence[Keypoints | None] = (), last: Array | None = None) -> KeypointEvidence | None:
+        """What the keypoints of one frame say of the person, who was in the `last` pose (D,) if it is known; None without any. Arguments as
+        in `step`."""
+        return keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, masks, middle_of(points), last)
+
+    def _faced(self, rng: np.random.Generator, state: MultiviewState, found: MultiviewState,
+               observation: MultiviewObservation) -> MultiviewState:
+        """The state `found` in a frame, or one that faces as the keypoints show, once the odds of half a second's frames are certain."""
+        seen = observation.keypoints
+        odds = 0.0 if seen is None or found.status in BLANK else seen.against(found.pose)
+        against = state.against + odds * 2 / self.rate if odds else 0.0
+        if against > CERTAIN and seen is not None and seen.front is not None:
+            return self.search(rng, observation, seen.front.heading)
+        return found._replace(against=against)
 
     def _with_arms(self, also: Cost | None, state: MultiviewState, masks: Sequence[Mask | None],
                   codes: Sequence[ColourCode | None]) -> Cost | None:
@@ -190,6 +223,8 @@ class MultiviewTracker:
             velocity = state.velocity if cycle == 0 else np.zeros_like(pose)  # the motion of a frame counts once
             poses, regions = self.proposals(rng, selected, pose, velocity, observation.mismatch, s.cooling**cycle,
                                             None if regions is None else regions[chosen])
+            if observation.keypoints is not None:  # not in the paper: after the last estimate, moved on
+                poses[1 : 1 + len(observation.keypoints.proposed)] = observation.keypoints.proposed[: len(poses) - 1]
             # Step 4, refinement: move each pose by forces and moments (eqs. 32-41).
             kept, refined = (slice(None), poses) if refine is None else refine(poses)
             poses, regions = poses[kept], None if regions is None else regions[kept]
@@ -201,7 +236,11 @@ class MultiviewTracker:
         return self.judge(pose, pose - state.pose, particles, observation, weigh)._replace(regions=regions)
 
     def search(self, rng: np.random.Generator, observation: MultiviewObservation, facing: float | None = None) -> MultiviewState:
-        """A state from this frame alone: the best of many poses in all directions, or about `facing` (rad), refined."""
+        """A state from this frame alone: the best of many poses in all directions, or about `facing` (rad), refined. By default about the
+        front that keypoints show, if it is certain."""
+        front = None if observation.keypoints is None else observation.keypoints.front
+        if facing is None and front is not None and front.is_certain:
+            facing = front.heading
         weigh = self.weigh(observation)
         found = pose_search.search(rng, self.body, self.refiner, observation, self.library, weigh, self.number, facing)
         still = np.zeros_like(found.best)
@@ -231,6 +270,8 @@ class MultiviewTracker:
             extras.append(lambda poses: s.arms * self.rarity_of_arms(poses))
         if s.limbs:
             extras.append(lambda poses: s.limbs * self.rarity_of_limbs(poses))
+        if observation.keypoints is not None:
+            extras.append(observation.keypoints.cost)
         return extras if observation.also is None else [*extras, observation.also]
 
     def rarity_of_arms(self, poses: Array) -> Array:
@@ -254,8 +295,8 @@ class MultiviewTracker:
         """The default preset's refinement (not in the paper)."""
         s, g = self.settings, self.settings.gauss_newton
         space = observation.space if g.emptiness and len(self.cameras) < MANY_CAMERAS else None
-        coarse = Pass(observation.cloud(g.share), g.coarse, g.coarse_tau, space, g.emptiness)
-        fine = Pass(observation.full, g.fine, g.fine_tau, space, g.emptiness)
+        coarse = Pass(observation.cloud(g.share), g.coarse, g.coarse_tau, space, g.emptiness, *observation.rays)
+        fine = Pass(observation.full, g.fine, g.fine_tau, space, g.emptiness, *observation.rays)
         centre, pull = self.posture_prior.quadratic(last, g.pull, s.posture)
         share = g.finalists if len(self.cameras) > FEW_CAMERAS else 1.0
         number = max(FEWEST_FINALISTS, round(share * self.number))

@@ -132,7 +132,7 @@ def _look_up(fields, window, x, y):  # pragma: no cover
 
 
 @device
-def _placed(T, place):  # pragma: no cover
+def placed(T, place):  # pragma: no cover
     """World coordinates of a point in a joint's frame."""
     return (T[0, 0] * place[0] + T[0, 1] * place[1] + T[0, 2] * place[2] + T[0, 3],
             T[1, 0] * place[0] + T[1, 1] * place[1] + T[1, 2] * place[2] + T[1, 3],
@@ -148,7 +148,7 @@ def _sphere_distances(T, spheres, space, c, distances):  # pragma: no cover
     for k in range(spheres.radii.size):
         joint, place, own = T[spheres.joints[k]], spheres.places[k], distances[k]
         own[0] = -np.inf
-        p0, p1, p2 = _placed(joint, place)
+        p0, p1, p2 = placed(joint, place)
         z = V[2, 0] * p0 + V[2, 1] * p1 + V[2, 2] * p2 + V[2, 3]
         if z < NEAR_PLANE:
             continue
@@ -197,9 +197,9 @@ def push_inside(T, spheres, space, distances, weight, origin, sums, adding):  # 
             total += share * (r * r if fade == 1 else TAU * (2 * r - TAU))
             if adding:
                 joint, place = T[spheres.joints[k]], spheres.places[k]
-                p0, p1, p2 = _placed(joint, place)
+                p0, p1, p2 = placed(joint, place)
                 n0, n1, n2 = _inward(own, V)
-                _add(n0, n1, n2, p0 - origin[0], p1 - origin[1], p2 - origin[2], share * fade, r, sums[spheres.joints[k]])
+                add_equation(n0, n1, n2, p0 - origin[0], p1 - origin[1], p2 - origin[2], share * fade, r, sums[spheres.joints[k]])
     return total
 
 
@@ -214,7 +214,7 @@ def rows_inside(T, spheres, space, distances, weight, origin, out):  # pragma: n
         _sphere_distances(T, spheres, space, c, distances[c])
     for k in range(number):
         outvoted = _is_outvoted(distances, k, spheres.radii[k], TRUSTED_CAMERAS)
-        p0, p1, p2 = _placed(T[spheres.joints[k]], spheres.places[k])
+        p0, p1, p2 = placed(T[spheres.joints[k]], spheres.places[k])
         x0, x1, x2 = p0 - origin[0], p1 - origin[1], p2 - origin[2]
         for c in range(cameras):
             own, V, at = distances[c, k], space.views[c], c * number + k
@@ -250,7 +250,7 @@ def _inward(own, V):  # pragma: no cover
 
 
 @device
-def _add(n0, n1, n2, x0, x1, x2, weight, distance, own):  # pragma: no cover
+def add_equation(n0, n1, n2, x0, x1, x2, weight, distance, own):  # pragma: no cover
     """Add to a joint's sums the equation of a point x that is to move a distance along n, as `gauss_newton` does for surface points."""
     row = (x1 * n2 - x2 * n1, x2 * n0 - x0 * n2, x0 * n1 - x1 * n0, n0, n1, n2)
     at = 0

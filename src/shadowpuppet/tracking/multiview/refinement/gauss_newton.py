@@ -8,6 +8,7 @@ from shadowpuppet.body.jacobian import MAX_STEP, TRANSLATION, place_one
 from shadowpuppet.jit import kernel, reduction_kernel
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, closest_on_part, closest_point, nearest, place_parts
 from shadowpuppet.tracking.multiview.refinement.free_space import push_inside
+from shadowpuppet.tracking.multiview.refinement.keypoint_rays import pull_to_rays
 from shadowpuppet.tracking.multiview.refinement.part_sums import add_descendants, bounded_cost, is_first_of_part, sum_by_joint, sum_costs
 
 
@@ -131,8 +132,10 @@ def solve_cholesky(A, b):  # pragma: no cover
 
 @kernel
 def descend(poses, centre, pull, chain, limbs, rows, groups, origin, points, numbers, damping, iterations, which, room, system,
-            spheres, space, distances, emptiness, costs):  # pragma: no cover
-    """Move poses (N, D), in place, as `Refiner.gauss_newton` describes; `costs` (N,) receives what they cost then."""
+            spheres, space, distances, emptiness, keypoints, costs):  # pragma: no cover
+    """Move poses (N, D), in place, as `Refiner.gauss_newton` describes; `costs` (N,) receives what they cost then. `keypoints`: landmarks,
+    sights, m^2 a nat and two work arrays of `pull_to_rays`."""
+    landmarks, sights, worth, places, logs = keypoints
     T, screws, work, sums = room[1], room[2], room[3], room[6]
     H, A, vectors = system
     D = pull.size
@@ -147,6 +150,7 @@ def descend(poses, centre, pull, chain, limbs, rows, groups, origin, points, num
             else:
                 cost = sum_costs(T, limbs, rows, groups, origin, numbers, which, room) / points
             cost += push_inside(T, spheres, space, distances, emptiness * points, origin, sums, turn < iterations) / points
+            cost += pull_to_rays(T, landmarks, sights, worth * points, origin, sums, places, logs, turn < iterations) / points
             for d in range(D):
                 cost += pull[d] * (pose[d] - about[d]) ** 2
             if cost <= least:

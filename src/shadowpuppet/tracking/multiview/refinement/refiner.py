@@ -6,6 +6,7 @@ All methods take many poses and treat each independently.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +17,9 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
+from shadowpuppet.tracking.keypoints.definitions import NO_LANDMARKS, Landmarks, landmarks_of
+from shadowpuppet.tracking.keypoints.likelihood import surprises
+from shadowpuppet.tracking.keypoints.sights import NO_SIGHTS, Sights
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, normal_weights, part_constants
 from shadowpuppet.tracking.multiview.refinement.forces import LINEAR, QUADRATIC, UNBOUNDED, push
 from shadowpuppet.tracking.multiview.refinement.free_space import FreeSpace, free_space, spheres_in
@@ -41,6 +45,10 @@ class Pass(NamedTuple):
     """Distances to the silhouettes; None: the silhouettes do not count."""
     emptiness: float = 0.0
     """Weight of the mean squared distance by which limbs reach out of the silhouettes; added to that of the points."""
+    sights: Sights = NO_SIGHTS
+    """Rays to the body's landmarks (`Refiner.landmarks`)."""
+    worth: float = 0.0
+    """What a nat of their surprise costs, m^2; added to the mean squared distance of the points."""
 
 
 class Refiner:
@@ -59,6 +67,11 @@ class Refiner:
         self.spheres, self._no_space = spheres_in(limbs), free_space(())
         self._limbs = limbs.joints, np.ascontiguousarray(limbs.rotations), np.ascontiguousarray(limbs.starts)
         self._parts = part_constants(limbs)
+
+    @cached_property
+    def landmarks(self) -> Landmarks:
+        """The body's landmarks that keypoints show."""
+        return landmarks_of(self.body)
 
     def costs(self, poses: Array, cloud: Cloud, tau: float | None = None) -> Array:
         """D of eq. 30 for poses (N, D): the mean over the points of min(d^2, tau^2), m^2, of shape (N,). `tau` replaces the settings'."""
@@ -86,13 +99,20 @@ class Refiner:
         """Poses (N, D) refined by one pass of `gauss_newton`, whose arguments these are, and what they cost then (N,), m^2."""
         poses = self.body.skeleton.checked(poses).copy()
         centre, pull = np.ascontiguousarray(np.atleast_2d(centre), float), np.asarray(pull, float)
-        cloud, iterations, tau, space, emptiness = each
+        cloud, iterations, tau, space, emptiness, sights, worth = each
         space, costs = space or self._no_space, np.empty(len(poses))
+        marks = self.landmarks if sights.size else NO_LANDMARKS
+        keypoints = marks.arrays, sights, worth, np.zeros((len(marks.names), 3)), np.zeros((sights.size, 2, 2))
         distances = np.empty((len(space.windows), len(self.spheres.radii), 4))
         descend(poses, centre, pull, self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin, max(cloud.total, 1e-9),
                 self._numbers(tau), damping, iterations, self._which(cloud), self._room(), self._system(), self.spheres, space,
-                distances, emptiness, costs)
+                distances, emptiness, keypoints, costs)
         return poses, costs
+
+    def surprises(self, poses: Array, sights: Sights) -> Array:
+        """Surprise (N,), nats, of keypoints given poses (N, D)."""
+        marks = self.landmarks
+        return surprises(self.body.skeleton.points(poses, marks.joints, marks.places), sights, marks)
 
     def forces(self, poses: Array, cloud: Cloud, settings: ForceSettings) -> Array:
         """Poses (N, D) moved by simulated force and moment (eqs. 32-41), within limits, until these balance: first with the coarse, then

@@ -20,14 +20,16 @@ class RigWatch:
         self._many = number > 1
 
     def __call__(self, seconds: float, seen: Seen) -> Seen:
-        """What is seen in a frame set at a time (s), without the masks of cameras that are set aside. A single camera is never set aside:
-        when it is blind is only noted. A frozen picture's own masks stay alike, whatever other cameras add to them."""
+        """What is seen in a frame set at a time (s), without masks and keypoints of cameras that are set aside. A single camera is
+        never set aside: when it is blind is only noted. A frozen picture's own masks stay alike, whatever other cameras add to them."""
         masks, own = seen.masks, seen.own
         if not self._many:
             self._watch.aside.note(seconds, ["blind" if is_blind(mask) else "" for mask in masks])
             return seen
         kept = self._steps(seconds, self._watch(seconds, own or masks))
-        return seen._replace(masks=tuple(None if of_own is None else mask for of_own, mask in zip(kept, masks, strict=True)))
+        found = (None if of_own is None else each for of_own, each in zip(kept, seen.keypoints))
+        return seen._replace(masks=tuple(None if of_own is None else mask for of_own, mask in zip(kept, masks, strict=True)),
+                             keypoints=tuple(found))
 
     def tracked(self, drawn: Sequence[Bits]) -> None:
         """The body of the first frame set that has none yet, as `StepWatch.tracked` expects it."""

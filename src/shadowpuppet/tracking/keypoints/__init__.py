@@ -1,0 +1,1 @@
+"""Keypoints, the joints that a detector finds in pictures, as evidence of a person's pose."""

@@ -1,0 +1,69 @@
+"""Which detection is the person: that in the silhouette, or nearest to the body; guesses outside the picture are no sights; the front."""
+
+from __future__ import annotations
+
+import actor
+import numpy as np
+from detector import EXACT, detected
+
+from shadowpuppet.camera.keypoints import Keypoints
+from shadowpuppet.tracking.keypoints.choice import people_at, people_in
+from shadowpuppet.tracking.keypoints.definitions import landmarks_of
+from shadowpuppet.tracking.keypoints.front import front_of
+from shadowpuppet.tracking.keypoints.sights import OUTLYING, sights_of
+
+BODY = actor.body()
+MARKS = landmarks_of(BODY)
+CAMERAS = actor.cameras()
+POSES = actor.walk(BODY.skeleton, 2)
+OWN, OTHER = (BODY.skeleton.points(POSES[:1], MARKS.joints, MARKS.places)[0] + shift for shift in (0, np.array([0.5, 0.6, 0.0])))
+
+
+def both(confidence: float = 0.6) -> list[Keypoints]:
+    """The other person, confident, before the own one."""
+    found = [detected(np.random.default_rng(0), CAMERAS, np.zeros(1), MARKS.names, each[None], EXACT)[0] for each in (OTHER, OWN)]
+    return [Keypoints(MARKS.names, np.concatenate([a.xy, b.xy]), np.array([[0.99], [confidence]]) * np.ones((1, len(MARKS.names))),
+                      np.array([7, 8]), "made") for a, b in zip(*found)]
+
+
+def test_the_person_is_the_one_in_the_silhouette_not_the_most_confident():
+    masks = actor.masks(BODY, POSES[0])
+    assert people_in(masks, CAMERAS, both()) == (1,) * len(CAMERAS)
+    assert people_in([np.zeros_like(mask) for mask in masks], CAMERAS, both()) == (None,) * len(CAMERAS)
+    assert people_in([None, *masks[1:]], CAMERAS, [*both()[:2], None, *both()[3:]]) == (None, 1, None, 1, 1)
+
+
+def test_the_person_is_the_one_nearest_to_the_body_on_whichever_side():
+    assert people_at(OWN, CAMERAS, both(), MARKS) == (1,) * len(CAMERAS)
+    assert people_at(OTHER, CAMERAS, both(), MARKS) == (0,) * len(CAMERAS)
+    assert people_at(OWN[MARKS.mirrored], CAMERAS, both(), MARKS) == (1,) * len(CAMERAS)
+    nobody = Keypoints(MARKS.names, np.zeros((0, len(MARKS.names), 2)), np.zeros((0, len(MARKS.names))), np.zeros(0, np.int64), "made")
+    assert people_at(OWN, CAMERAS, [nobody, None, *both()[2:]], MARKS) == (None, None, 1, 1, 1)
+
+
+def test_points_outside_the_picture_and_missing_ones_are_no_sights():
+    keypoints = both(1.0)
+    xy, confidence = keypoints[0].xy.copy(), keypoints[0].confidence.copy()
+    xy[1, 0], xy[1, 1], confidence[1, 2] = (-30, 5), np.nan, 0
+    keypoints[0] = Keypoints(MARKS.names, xy, confidence, keypoints[0].person, "made")
+    found = sights_of(CAMERAS, keypoints, (1, None, 1, 1, 1), MARKS, OWN.mean(0))
+    assert found.landmarks[found.cameras == 0].tolist() == list(range(3, len(MARKS.names)))
+    assert not (found.cameras == 1).any()
+    assert found.outlying.max() < OUTLYING + 1e-9
+    assert np.abs(np.einsum("mij,mj->mi", found.across, found.rays)).max() < 1e-12
+
+
+def test_a_detector_that_is_less_confident_has_wider_errors_and_more_outliers():
+    sure, unsure = (sights_of(CAMERAS, both(confidence), (1,) * 5, MARKS, OWN.mean(0)) for confidence in (1.0, 0.5))
+    assert (unsure.squares > sure.squares).all()
+    assert (unsure.outlying > sure.outlying).all()
+
+
+def test_the_front_is_that_of_the_best_pose_by_the_best_that_faces_the_other_way():
+    front = front_of(np.array([0.1, 3.0, 0.2, -2.8]), np.array([10.0, 30.0, 12.0, 25.0]))
+    assert front is not None
+    assert (front.heading, front.odds, front.is_certain) == (0.1, 15.0, True)
+    same = front_of(np.array([0.1, 0.2]), np.array([1.0, 90.0]))
+    assert same is not None
+    assert not same.is_certain
+    assert front_of(np.zeros(0), np.zeros(0)) is None
