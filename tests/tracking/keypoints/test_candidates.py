@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import actor
 import numpy as np
-from detector import EXACT, detected
 
+from benchmarks.detector import EXACT, detected
 from shadowpuppet.body.whole_body import heading_column
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.keypoints.candidates import candidates, landmarks_with_exchanged, pose_at, triangulated_landmarks

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import actor
 import numpy as np
-from detector import EXACT, detected
 
+from benchmarks.detector import EXACT, detected
 from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.tracking.keypoints.choice import people_at, people_in
 from shadowpuppet.tracking.keypoints.definitions import landmarks_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 import actor
 import numpy as np
 import pytest
-from detector import EXACT, USUAL, detected
 
+from benchmarks.detector import EXACT, USUAL, detected
 from shadowpuppet.body.jacobian import make_chain, place_one
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.keypoints.definitions import ARMS, Landmarks, landmarks_of

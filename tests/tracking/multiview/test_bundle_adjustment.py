@@ -7,10 +7,10 @@ from functools import cache
 import actor
 import numpy as np
 import pytest
-from detector import EXACT, detected
 from scans import make_body as random_tree
 from scans import scan, some_pose
 
+from benchmarks.detector import EXACT, detected
 from benchmarks.speed import naive_multi as naive
 from shadowpuppet.body.models import shares_of
 from shadowpuppet.body.sizes import AnatomicalSizes

@@ -8,8 +8,8 @@ from functools import partial
 import actor
 import numpy as np
 import pytest
-from detector import EXACT, detected
 
+from benchmarks.detector import EXACT, detected
 from shadowpuppet.body.anthropometry import SOLE, stature_of
 from shadowpuppet.body.models import WHOLE, average_sizes, make_body, shares_of
 from shadowpuppet.body.sizes import AnatomicalSizes

@@ -10,8 +10,8 @@ from dataclasses import replace
 import actor
 import numpy as np
 import pytest
-from detector import detected
 
+from benchmarks.detector import detected
 from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.errors import ShadowPuppetError

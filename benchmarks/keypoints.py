@@ -1,0 +1,150 @@
+"""What a detector's keypoints bring: joint errors by silhouettes alone, with keypoints too, and of the same keypoints triangulated alone.
+
+    python benchmarks/keypoints.py [FILM...] [--detector made] [--seeds 1] [-o build/keypoints]
+
+The films are made: walks toward two cameras, two cameras far apart, a chair that is not in the empty scene before four cameras, and those
+of `--rings`, three to eight cameras without training motion. `--detector made`: numbers with errors as a detector makes them
+(`detector.py`); `mediapipe`: what `shadowpuppet keypoints` finds in the films. Errors are means over shoulders, elbows, wrists, hips, knees
+and ankles, mm, a lost joint counting 500; triangulated points are smoothed at 6 Hz. `ms`: time a frame set of tracking and hull.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import smallest
+from detector import detected
+
+from shadowpuppet.geometry import Array
+from shadowpuppet.io.keypoints.film_keypoints import film_keypoints, write_keypoints
+from shadowpuppet.io.motion.table import read_joints
+from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.rig import Rig, open_rig
+from shadowpuppet.pipeline.track import track_recording
+from shadowpuppet.synthetic import Gesture, Mannequin, Scene, Spec, Viewpoint, named_specs, proving_rings, synthesize
+from shadowpuppet.tracking.keypoints.triangulation import triangulated
+from shadowpuppet.tracking.smoothing.butterworth import filtered
+
+ROOT = Path(__file__).resolve().parent.parent
+JOINTS = tuple(f"{side}_{name}" for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right"))
+LOST_MM, CUTOFF = 500.0, 6.0
+ROWS = ("triangulated", "silhouettes", "both")
+
+
+def films(rings: bool = False) -> Iterator[Spec]:
+    """Specs of the films."""
+    if rings:
+        yield from (replace(spec, training=(), tells="nothing") for spec in proving_rings())
+        return
+    walk = Gesture(motion="walk", seconds=5, path="line", size=2.0)
+    for n, (name, apart, motion) in enumerate((("toward_75", (-35, 40), (walk,)), ("toward_60", (-20, 40), (walk,)),
+                                               ("apart_115", (-20, 95), (Gesture(motion="reach", seconds=3),
+                                                                         Gesture(motion="wave_hands", seconds=3))))):  # fmt: skip
+        cameras = tuple(Viewpoint(name=f"cam{k}", azimuth_deg=azimuth, distance=4.2, height=1.6, fov_deg=50, pitch_deg=10, size=(480, 360))
+                        for k, azimuth in enumerate(apart, 1))  # fmt: skip
+        body = Mannequin.draw(np.random.default_rng(81 + n), "man" if n == 0 else "woman")
+        yield Spec(name=name, body=body, motion=motion, cameras=cameras, turn_deg=10 * n, tells="nothing", seed=(51, n),
+                   scene=Scene(clothing=81 + n, room=81 + n, empty_seconds=2.0))  # fmt: skip
+    yield replace(named_specs()["rings_sits_on_new"], name="new_chair", tells="nothing")
+
+
+def with_keypoints(recording: Path, detector: str, seed: int) -> Path:
+    """A recording with keypoints in it: `made` ones, or those that `shadowpuppet keypoints` finds beside it."""
+    if detector != "made":
+        found = recording.with_name(f"{recording.name}-{detector}")
+        if not (found / "keypoints").is_dir():
+            command = [sys.executable, "-m", "shadowpuppet", "keypoints", recording, "-o", found, "--with", detector, "--quiet"]
+            subprocess.run(list(map(str, command)), check=True)
+        return found
+    truth, rig = read_joints(recording / "truth.csv"), open_rig(recording, make_options({}))
+    columns = [truth.names.index(name) for name in JOINTS]
+    cameras = [footage.view.camera for footage in rig.footage]
+    found = detected(np.random.default_rng([51, seed]), cameras, truth.times, JOINTS, truth.positions[:, columns])
+    frames = np.arange(len(found))
+    for n, footage in enumerate(rig.footage):
+        xy, sure = (np.array([getattr(of[n], what)[0] for of in found]) for what in ("xy", "confidence"))
+        film = film_keypoints(JOINTS, frames, 0 * frames, xy, sure, "made", footage.view.camera.size)
+        (recording / "keypoints").mkdir(exist_ok=True)
+        write_keypoints(recording / "keypoints" / f"{footage.view.camera.name}.npz", film)
+    return recording
+
+
+def by_triangulation(rig: Rig, times: Array) -> JointTable:
+    """The keypoints' joints at some times, triangulated and smoothed."""
+    shape = len(rig.footage), len(times), len(JOINTS)
+    xy, sure = np.full((*shape, 2), np.nan), np.zeros(shape)
+    for n, footage in enumerate(rig.footage):
+        assert footage.keypoints is not None
+        for t, time in enumerate(times):
+            seen = footage.keypoints.at(round((time + footage.view.start) * footage.film.rate))
+            for k, name in enumerate(JOINTS):
+                if name in seen.names and len(seen.person):
+                    best = int(seen.confidence.sum(1).argmax())
+                    xy[n, t, k], sure[n, t, k] = seen.xy[best, seen.names.index(name)], seen.confidence[best, seen.names.index(name)]
+    points = triangulated([footage.view.camera for footage in rig.footage], xy, np.where(np.isfinite(xy[..., 0]), sure, 0))
+    rate = (len(times) - 1) / (times[-1] - times[0])
+    return JointTable(times, JOINTS, filtered(times, points, min(CUTOFF, 0.4 * rate)))
+
+
+def error(found: JointTable, truth: JointTable) -> float:
+    """Mean error (mm) of `JOINTS`; one without a place counts `LOST_MM`."""
+    nearest = np.abs(truth.times[None] - found.times[:, None]).argmin(1)
+    ours, theirs = (table.positions[:, [table.names.index(name) for name in JOINTS]] for table in (found, truth))
+    away = 1000 * np.linalg.norm(ours - theirs[nearest], axis=2)
+    return float(np.where(np.isfinite(away), away, LOST_MM).mean())
+
+
+def measured(recording: Path, out: Path, seeds: int, detector: str) -> dict[str, tuple[float, float]]:
+    """Mean error (mm) and time a frame set (ms) of each row, means over seeds."""
+    values: dict[str, list[tuple[float, float]]] = {row: [] for row in ROWS}
+    truth = read_joints(recording / "truth.csv")
+    for seed in range(seeds):
+        known = with_keypoints(recording, detector, seed)
+        for row, evidence in (("silhouettes", "silhouettes"), ("both", "silhouettes,keypoints")):
+            run = track_recording(known, out / f"{recording.name}-{row}-{seed}", make_options({"seed": seed, "evidence": evidence}))
+            spent = run.metrics["ms_per_frame"]
+            values[row].append((error(run.motion.table, truth), spent["track"] + spent["hull"]))
+        found = by_triangulation(open_rig(known, make_options({})), run.motion.times)
+        values["triangulated"].append((error(found, truth), np.nan))
+    return {row: tuple(np.mean(some, axis=0).tolist()) for row, some in values.items()}
+
+
+def _smallest(folder: Path) -> Sequence[object]:
+    recording = smallest.make(folder / "ring", smallest.RING)
+    return [recording, "-o", folder]
+
+
+def main() -> None:
+    """Parse, make, track, print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("films", nargs="*", help="names of made films, or folders of recordings with truth.csv; all made ones without")
+    parser.add_argument("--rings", action="store_true", help="the rings of the proving ground")
+    parser.add_argument("--detector", default="made", choices=("made", "mediapipe"))
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("-o", "--out", type=Path, default=ROOT / "build" / "keypoints")
+    args = smallest.parse(parser, _smallest)
+    specs = {spec.name: spec for spec in films(args.rings)}
+    print("| film | " + " | ".join(ROWS) + " | ms, silhouettes | ms, both |\n" + "|---" * 6 + "|")
+    for name in args.films or specs:
+        recording = args.out / name if name in specs else Path(name)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            if name in specs and not (recording / "truth.csv").exists():
+                shutil.rmtree(recording, ignore_errors=True)
+                synthesize(specs[name], recording)
+            rows = measured(recording, args.out / "runs", args.seeds, args.detector)
+        cells = [f"{rows[row][0]:.1f}" for row in ROWS] + [f"{rows[row][1]:.0f}" for row in ROWS[1:]]
+        print(f"| {recording.name} | " + " | ".join(cells) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
