@@ -86,7 +86,7 @@ def of_several(film: FilmSurvey) -> FilmSurvey:
     silhouettes, runs = _made(film.sample, film.silhouettes.of_several())
     masks = [mask for run in runs for mask in run]
     look = replace(film.look, exact_overlap=mean_overlap(masks, film.exact), condition=condition_of(silhouettes, film.sample, runs))
-    return film._replace(silhouettes=silhouettes, masks=masks, look=look)
+    return film._replace(silhouettes=silhouettes, runs=runs, look=look)
 
 
 def _made(sample: Sample, silhouettes: Silhouettes) -> tuple[Silhouettes, list[list[Mask]]]:
