@@ -18,8 +18,6 @@ LEAST_NOISE = np.array([0.7, 0.5, 0.5])
 MOVED, STIRRED = 3.0, 2.0
 """Standard deviation over time, over the noise, from which on something moved over a pixel; and over a pixel and its neighbours, next to
 such pixels: the outline of someone who stands still."""
-GAP = 2
-"""Half of the widest gap, pixels, in what moves around a person that stands that does not open it."""
 DEPTH = 2
 """Pixels from its border from which on a calm pixel is inside a region."""
 PART_SHARE, PART_PIXELS = 0.1, 30
@@ -52,10 +50,10 @@ def find_movement(planes: Floats) -> Movement:
     moved = _large_parts(_without_specks(variance > MOVED**2))
     stirred = _without_specks(cv2.blur(variance, (3, 3)) > STIRRED**2) | moved
     region = np.asarray(cv2.dilate(_touching(stirred, moved), np.ones((3, 3), np.uint8)), np.uint8) > 0
+    region |= _enclosed(region)
     # The picture's lower border cuts a person off: what lies there is as deep inside as above it.
-    inside = np.pad((region | _enclosed(region)).astype(np.uint8), DEPTH, mode="edge")
+    inside = np.pad(region.astype(np.uint8), DEPTH, mode="edge")
     inside = cv2.erode(inside, np.ones((2 * DEPTH + 1, 2 * DEPTH + 1), np.uint8))[DEPTH:-DEPTH, DEPTH:-DEPTH] > 0
-    region |= _enclosed(region, GAP)
     return Movement(noise, region, inside & ~(cv2.dilate(moved, np.ones((3, 3), np.uint8)) > 0))
 
 
@@ -93,13 +91,11 @@ def _large_parts(moved: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return moved & (areas >= max(PART_SHARE * areas.max(), PART_PIXELS)).astype(np.uint8)[np.asarray(parts, np.intp)]
 
 
-def _enclosed(region: Mask, gap: int = 0) -> Mask:
-    """The pixels (H, W) from which every way to the left, right or upper border leads through the region, its gaps of up to twice `gap`
-    pixels closed."""
+def _enclosed(region: Mask) -> Mask:
+    """The pixels (H, W) from which every way to the left, right or upper border leads through the region."""
     import cv2
 
-    closed = cv2.morphologyEx(region.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((2 * gap + 1, 2 * gap + 1), np.uint8))
-    around = np.pad(closed == 0, ((1, 0), (1, 1)), constant_values=True).astype(np.uint8)
+    around = np.pad(~region, ((1, 0), (1, 1)), constant_values=True).astype(np.uint8)
     _, parts = cv2.connectedComponents(around, connectivity=4)
     outside = np.asarray(parts) == np.asarray(parts)[0, 0]
     return ~outside[1:, 1:-1] & ~region
