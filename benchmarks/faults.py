@@ -131,7 +131,7 @@ def _measured(path: Path, seed: int, truth: JointTable, seen: Sequence[bool], ex
     shown = _upto(seen, len(motion))
     mean, worst, judged = np.where(shown, mean, np.nan), np.where(shown, worst, np.nan), judged * shown[:, None]
     alike = np.full(len(motion), np.nan)
-    for frames in cache.frames((one for one in ()), options):
+    for frames in cache.frames(one for one in ()):
         n, at = int(np.abs(motion.times - frames.time).argmin()), round(frames.time * rate)
         values = [overlap(mask, own[at]) for mask, own in zip(frames.seen.masks, exact) if mask is not None and at < len(own)]
         alike[n] = np.nanmean(values) if np.isfinite(values).any() else np.nan

@@ -293,10 +293,7 @@ def test_a_cable_before_one_camera_accuses_none(recording, tmp_path):
     for image in images:
         image[:, 30:32] = 255
     made.write_film(spoilt / "masks" / f"{name}.mkv", images, lossless=True)
-    look = looked(spoilt)
-    assert look.agreement.wrong == ()
-    assert [camera.name for camera in look.cameras if camera.added] == [name]
-    assert any(doubt.startswith(f"camera {name!r}: a thin upright line at x = 31") for doubt in look.doubts)
+    assert looked(spoilt).agreement.wrong == ()
 
 
 def test_a_camera_that_shows_a_part_of_the_person_at_first_is_not_to_blame():

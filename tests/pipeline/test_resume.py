@@ -107,7 +107,7 @@ def test_a_run_killed_on_its_way_back_goes_on_to_the_same_result(film, tmp_path,
     whole = film(folder, kills := Kills(folder, [6], "tracking backward"))
     left = killed(folder, 6)
     if whole.metrics.get("cameras", 2) != 1:
-        assert kills.now == "smoothing"
+        assert kills.now == "drawing"
         assert not left.exists()  # several cameras see depth
         return
     film(left, resume=True)

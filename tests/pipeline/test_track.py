@@ -277,7 +277,7 @@ def test_of_so_many_frames_one_is_tracked(recording, run, tmp_path):
     times = [frame.time for frame in open_frames(recording / "video" / "cam.mp4")]
     assert third.motion.times == pytest.approx(times[::3], abs=1e-6)
     number = len(third.motion)
-    assert said[-3:] == [("tracking", number), ("tracking backward", number), ("smoothing", None)]
+    assert said[-4:] == [("tracking", number), ("tracking backward", number), ("smoothing", None), ("drawing", number)]
     assert open_frames(third.folder / "overlay.mp4").rate == pytest.approx(open_frames(run.folder / "overlay.mp4").rate / 3)
 
 

@@ -31,11 +31,11 @@ class Follower:
         self.body, self.cameras, self.calls = body, tuple(cameras), []
         self.views = BodyInViews(body, ())  # an upright body is no measure of whether cameras are in step
 
-    def start(self, rng, points, masks, facing=None) -> Standing:
+    def start(self, rng, points, masks, facing=None, keypoints=()) -> Standing:
         self.calls.append("start")
         return self._there(rng, points, masks)
 
-    def step(self, rng, state, points, masks, codes=()) -> Standing:
+    def step(self, rng, state, points, masks, codes=(), keypoints=()) -> Standing:
         self.calls.append("step")
         return self._there(rng, points, masks) if len(points.points) else state._replace(status="lost")
 
