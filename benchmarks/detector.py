@@ -75,7 +75,7 @@ def _runs(rng: np.random.Generator, times: Array, share: float, shortest: float,
 
 
 def _mirrored(offsets: Array, names: Sequence[str]) -> Array:
-    """Offsets (K, 3), forward, left, up, of which the right side's mirror the left's."""
+    """Offsets (K, 3), forward, left, up, with each right landmark's as the mirror image of the left one's."""
     out = offsets.copy()
     for n, name in enumerate(names):
         if name.startswith("right_"):

@@ -88,7 +88,7 @@ def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: L
     check_smoothing(options, survey.look.rate)
     entries = {key: value for key, value in writer.info.items() if key not in (*OWN_KEYS, "people", "truth")}
     people = PeopleRun(writer, survey, survey.census, options, entries, listener)
-    found = people.track(*rngs, smooth_run, show_run)
+    found = people.track(*rngs, smooth_run)
     if not found:
         raise TrackingError(f"{survey.look.recording}: nobody is found in the silhouettes of {survey.census.number} people")
     if len(found) < min(survey.census.number, options.people or survey.census.number):

@@ -35,7 +35,7 @@ def seen(camera, start=0.0, shift=0.0, persons=1):
 
 @pytest.fixture
 def recording(tmp_path):
-    """Two cameras, the second of which films 0.2 s longer before the recording begins."""
+    """Two cameras; the second film begins 0.2 s before the recording."""
     cameras = made_rig.cameras(4)[:2]
     write_calibration(tmp_path / "calibration.toml", cameras)
     (tmp_path / "keypoints").mkdir()

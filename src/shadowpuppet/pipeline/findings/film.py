@@ -84,9 +84,9 @@ def _each(rig: Rig, work: Callable[..., FilmSurvey], *every: Sequence[object]) -
 def of_several(film: FilmSurvey) -> FilmSurvey:
     """The survey of a film that shows several people: silhouettes of all of them, and what these say of the film."""
     silhouettes, runs = _made(film.sample, film.silhouettes.of_several())
-    masks = [mask for run in runs for mask in run]
-    look = replace(film.look, exact_overlap=mean_overlap(masks, film.exact), condition=condition_of(silhouettes, film.sample, runs))
-    return film._replace(silhouettes=silhouettes, runs=runs, look=look)
+    found = film._replace(silhouettes=silhouettes, runs=runs)
+    look = replace(film.look, exact_overlap=mean_overlap(found.masks, film.exact), condition=condition_of(silhouettes, film.sample, runs))
+    return found._replace(look=look)
 
 
 def _made(sample: Sample, silhouettes: Silhouettes) -> tuple[Silhouettes, list[list[Mask]]]:

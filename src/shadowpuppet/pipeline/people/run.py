@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
@@ -49,19 +49,17 @@ from shadowpuppet.pipeline.progress import (
     warn_of_set_aside,
     write_beside,
 )
-from shadowpuppet.pipeline.rig import FrameSet, Rig
+from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore
+from shadowpuppet.pipeline.stages.show import Draw, show_run
 from shadowpuppet.pipeline.subject import joint_names
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 from shadowpuppet.tracking.people.presence import Followed, Sighting
-from shadowpuppet.video import Image
 
 Smooth = Callable[[RunWriter, Sequence[tuple[int, MultiviewSubject]], Options, Listener, Motion], None]
 """Replaces the motion of a run by a given one, smoothed."""
-Show = Callable[[RunWriter, Survey, Options, Listener, MaskStore, Iterable[Callable[[FrameSet], Image]]], None]
-"""Writes the overlay of frame sets, each drawn by a function."""
 
 
 def check_people(options: Options) -> None:
@@ -109,7 +107,7 @@ class PeopleRun:
         self.store = MaskStore()
         """Their silhouettes, if an overlay is asked for."""
 
-    def track(self, for_fit: np.random.Generator, for_track: np.random.Generator, smooth: Smooth, show: Show) -> dict[int, dict[str, Any]]:
+    def track(self, for_fit: np.random.Generator, for_track: np.random.Generator, smooth: Smooth) -> dict[int, dict[str, Any]]:
         """Track all people; returns each person's metrics by number, none if no person is found."""
         carried: Carried | None = self.writer.hand_over((*TYPES, Carried))
         if carried is not None and not is_same_look(carried.look, json_text(self.survey.look)):
@@ -122,7 +120,7 @@ class PeopleRun:
             for number, motion in put_right(people, motions, group.subject).items():
                 subject = group.subject(people.people[number - 1].measured)
                 smooth(self.writers[number], [(0, subject)], self.options, self.listener, motion)
-            show(self.writer, self.survey, self.options, self.listener, self.store, self._drawings(group, people))
+            show_run(self.writer, self.survey, self.options, self.listener, self.store, self._drawings(group, people))
             truths = matched_truths({n: writer.motion for n, writer in self.writers.items()}, self.rig.recording.truths)
             for n, truth in truths.items():
                 self.writers[n].info["truth"] = str(truth.resolve())
@@ -132,7 +130,7 @@ class PeopleRun:
         warn_of_set_aside(self.metrics.get("set_aside", []))
         return found
 
-    def _drawings(self, group: Group, people: PeopleState) -> Iterator[Callable[[FrameSet], Image]]:
+    def _drawings(self, group: Group, people: PeopleState) -> Iterator[Draw]:
         """Draws all people's motions in each frame set."""
         found: dict[float, list[tuple[int, MotionFrame, Sequence[Picture]]]] = {time: [] for time in self.times}
         for number, writer in self.writers.items():

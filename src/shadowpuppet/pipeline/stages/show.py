@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 
+from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.io.run_writer import RunWriter
 from shadowpuppet.motion.motion import BLANK, Motion
 from shadowpuppet.pipeline.findings.look import Survey
@@ -37,7 +38,7 @@ def show_run(writer: RunWriter, survey: Survey, options: Options, listener: List
     start = time.perf_counter()
     with write_frames(writer.folder / "overlay.mp4", rate) as film, closing(_pictured(survey, options, store)) as frames:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what reading the films warns of was said while they were tracked
+            warnings.simplefilter("ignore", ShadowPuppetWarning)  # what reading the films warns of was said while they were tracked
             for n, (now, draw) in enumerate(zip(frames, drawings), 1):
                 film.write(draw(now))
                 listener.advance(n)

@@ -30,7 +30,7 @@ def people(landmarks):
 
 
 def main() -> None:
-    """Write the names of the landmarks, then a line for each frame; nobody in it where no person is found."""
+    """Write the names of the landmarks, then a line for each frame, with an empty list of people where no person is found."""
     out.write(json.dumps({"names": NAMES, "detector": "MediaPipe", "origin": 0.5}).encode() + b"\n")
     # The second of three networks, which follows the person from frame to frame.
     with mediapipe.solutions.pose.Pose(model_complexity=1, enable_segmentation=MASKS, smooth_segmentation=False) as pose:
