@@ -90,7 +90,7 @@ def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Ma
     def follow(n: int, evidence: Division) -> tuple[MultiviewState, Drawn]:
         tracker, rng, state = people[n]
         own, ignored = evidence.of(n)
-        observation = PersonObservation(tracker.views, own, masks, None, ignored, halves, evidence.drawn[n].bits)
+        observation = PersonObservation(tracker.views, own, masks, None, ignored, halves)
         state = _judged(tracker.follow(rng, state, observation))
         return state, draw_person(tracker, state.pose)
 
