@@ -59,9 +59,6 @@ class GaussNewtonSettings:
     emptiness: NonNegative = 2.0
     """Weight of the mean squared distance by which limbs reach out of the silhouettes, with fewer than six cameras. A quarter of it if all
     films have lost detail to compression."""
-    finalists: Annotated[float, Field(gt=0, le=1)] = 0.3
-    """With five cameras and more: share of the poses, those that cost least after the coarse iterations, that go through the fine ones, at
-    least eight; the others are dropped. With 0.15, made recordings are 2 % less accurate. With fewer cameras all go on."""
     damping: Positive = 0.03
     """Initial damping, as a share of each DOF's curvature."""
     pull: NonNegative = 1e-5
@@ -226,7 +223,6 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "recover": False,
         "surface": {"epsilon": 0.3, "tau": 0.06, "nearest": "euclidean"},
         "forces": {"rho": "quadratic"},
-        "gauss_newton": {"finalists": 1.0},
     },
 }
 """Named settings of the tracker for several cameras, as `PRESETS`."""
