@@ -18,6 +18,7 @@ from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
+from shadowpuppet.tracking.multiview.tracker import MIN_POINTS
 from shadowpuppet.tracking.people.figures import Figure, find_floor, find_people, telling
 from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.presence import certain_number, counted, sure_number
@@ -31,8 +32,6 @@ FLOOR_SETS = 6
 """Number of those on which the floor is found."""
 LEAST_AREA, LEAST_HEIGHT = 0.15, 0.4
 """Least area and height of another person in a picture, over the largest part's: one two and a half times as far away."""
-FEW_POINTS = 50
-"""Least number of surface points of all sets together that show people."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +90,7 @@ def take_census(cameras: Sequence[Camera], sets: Sequence[Seen], later: Sequence
     with ThreadPoolExecutor(usable_cores(), "census") as pool:
         points = [surface.points for surface in pool.map(lambda seen: hull.points(seen.masks), sets)]
         everywhere = np.concatenate(points) if points else np.zeros((0, 3))
-        if len(everywhere) < FEW_POINTS:
+        if len(everywhere) < MIN_POINTS:
             return None
         floor = find_floor(cameras, everywhere, [sets[n] for n in evenly_spread(len(sets), FLOOR_SETS)])
         every = list(pool.map(lambda seen: find_people(floor, seen), sets))

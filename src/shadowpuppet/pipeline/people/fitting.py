@@ -18,11 +18,12 @@ from shadowpuppet.pipeline.people.state import Measured
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, average_person, fit_in_views, known_person
 from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.presence import Followed, Sighting
+from shadowpuppet.tracking.people.tracker import VIEWS
 from shadowpuppet.tracking.people.views import views_of
 
-VIEWS, MIN_SETS, MOST_SETS = 3, 4, 16
-"""Least number of views (of all, if there are fewer cameras) and of frame sets that show a person apart for sizes to be measured, and the
-most sets that are used."""
+MIN_SETS, MOST_SETS = 4, 16
+"""Least number of frame sets in which `VIEWS` (all, if there are fewer cameras) show a person apart for sizes to be measured, and the most
+sets that are used."""
 TALL = 0.8, 2.3
 """Least and greatest height of a person, metres, that is expected of a figure; the sizes are refined from there."""
 
