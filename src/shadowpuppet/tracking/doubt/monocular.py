@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.body.upper_body import BOW
 from shadowpuppet.camera.bits import unpack
 from shadowpuppet.camera.mask import Mask
@@ -28,8 +27,6 @@ SAMPLES = 24
 """Number of poses drawn from the particles."""
 TEMPERATURE = 100.0
 """A particle's weight falls to 1/e for this much more cost (pixels at 320 x 240): neighbouring pixels err together."""
-SHORTENING = 0.02
-"""Uncertainty (m) of a segment's length in the picture, from outline and body shape."""
 THIN = 0.03
 """Half width of what an inaccurate outline may leave over, as a share of the root of the person's area."""
 DISTANCE = 0.02
@@ -91,7 +88,7 @@ class MonocularDoubt:
 
         Axes are the camera's: x right, y down, z forward. Of every joint there are: a constant; the particles' spread across and along
         the view; the distance in depth to its mirror image, which draws the same silhouette (an arm before or behind the body, the trunk
-        turned to the left or right); the error of depth by foreshortening; of its limb, the hidden share, the silhouette near it that
+        turned to the left or right); of its limb, the hidden share, the silhouette near it that
         nothing explains, the share outside the silhouette and the share outside the picture, times the joint's lever; the same of what
         does not match the arm's colours, if they are known, by which the hidden share is then multiplied; how far it left its course;
         the misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; the distances to the
@@ -118,7 +115,6 @@ class MonocularDoubt:
             "spread": np.sqrt((spread[:, :2] ** 2).mean(1)),
             "spread_depth": spread[:, 2],
             "mirrored": self._chains.mirrored(points),
-            "foreshortened": self._chains.foreshortened(points, at["left_shoulder"] - at["right_shoulder"]),
             "turned": np.full(len(points), abs(at["left_shoulder"][2] - at["right_shoulder"][2])),
             "bowed": np.full(len(points), abs(at["neck"][2] - at["pelvis"][2])),
             "surprise": surprise(points, seconds, trail),
@@ -216,8 +212,6 @@ class Chains:
     ends: NDArray[np.int64]
     bears: Array
     """1 where a landmark's place depends on a bone's direction, (L, B)."""
-    sided: NDArray[np.bool_]
-    """Whether a landmark is a limb's, (L,)."""
 
     @classmethod
     def of(cls, names: Sequence[str]) -> Chains:
@@ -229,25 +223,10 @@ class Chains:
         bones = list(dict.fromkeys(bone for chain in chains for bone in chain))
         starts, ends = np.array([[names.index(a), names.index(b)] for a, b in bones]).reshape(-1, 2).T
         bears = np.array([[bone in chain for bone in bones] for chain in chains], float)
-        return cls(starts, ends, bears, np.array([name.partition("_")[0] in SIDES for name in names]))
+        return cls(starts, ends, bears)
 
     def mirrored(self, points: Array) -> Array:
         """How far in depth (L,), metres, landmarks (L, 3) move if the bones above them point as far to the front as to the back."""
-        return np.sqrt(self.bears @ (2 * self._along(points)[1]) ** 2)
-
-    def foreshortened(self, points: Array, across: Array) -> Array:
-        """Errors of depth (L,), metres, of landmarks (L, 3) if the bones above look longer or shorter by `SHORTENING`, and so half the line
-        of the shoulders, `across` (3,)."""
-        shoulders = _depth_errors(np.array([float(np.linalg.norm(across)) / 2]), across[2:] / 2)
-        return np.sqrt(self.bears @ _depth_errors(*self._along(points)) ** 2 + self.sided * shoulders**2)
-
-    def _along(self, points: Array) -> tuple[Array, Array]:
-        """Each bone's length, and its part along the view through its end (B,), metres."""
         bones, ends = points[self.ends] - points[self.starts], points[self.ends]
-        return np.sqrt((bones**2).sum(1)), (bones * ends).sum(1) / np.sqrt((ends**2).sum(1))
-
-
-def _depth_errors(lengths: Array, depths: Array) -> Array:
-    """Errors of depth (B,) of bones that look longer or shorter by `SHORTENING`, from lengths and depths (B,), metres."""
-    seen = np.sqrt(np.maximum(lengths**2 - depths**2, 0))
-    return np.minimum(seen * SHORTENING / np.maximum(np.abs(depths), 1e-6), np.sqrt(2 * lengths * SHORTENING))
+        along = (bones * ends).sum(1) / np.sqrt((ends**2).sum(1))  # each bone's part along the view through its end
+        return np.sqrt(self.bears @ (2 * along) ** 2)
