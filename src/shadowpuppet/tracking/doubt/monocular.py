@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, joints_of_limbs, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import levers_of, limb_of_part
-from shadowpuppet.tracking.doubt.mirror import TOGETHER_ALLOWED, Mirrors
+from shadowpuppet.tracking.doubt.mirror import Mirrors
 from shadowpuppet.tracking.doubt.steps import CONSTANT, Trail, stillness, surprise
 from shadowpuppet.tracking.frozen import is_frozen, same_silhouette
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
@@ -87,12 +86,11 @@ class MonocularDoubt:
         """What the frame shows about the accuracy of the estimate of a mask (H, W) at a time (s); and what the next frame needs.
 
         Axes are the camera's: x right, y down, z forward. Of every joint there are: a constant; the particles' spread across and along
-        the view; the distance in depth to its mirror image, which draws the same silhouette (an arm before or behind the body, the trunk
-        turned to the left or right); of its limb, the hidden share, the silhouette near it that
-        nothing explains, the share outside the silhouette and the share outside the picture, times the joint's lever; the same of what
-        does not match the arm's colours, if they are known, by which the hidden share is then multiplied; how far it left its course;
-        the misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; the distances to the
-        images of each arm, and of the trunk with both; and the error of the person's distance.
+        the view; the depth by which the trunk turns, and bows; of its limb, the hidden share, the silhouette near it that nothing explains,
+        the share outside the silhouette and the share outside the picture, times the joint's lever; the same of what does not match the
+        arm's colours, if they are known, by which the hidden share is then multiplied; how far it left its course; the misfit of the whole
+        body; how long the silhouette has not changed; the distances to the mirror images of each arm; and the error of the person's
+        distance.
         """
         points = self.tracker.picture.points(state.pose[None])[0]
         at, lever = dict(zip(self.names, points)), levers_of(self.names)
@@ -114,7 +112,6 @@ class MonocularDoubt:
             "constant": np.full(len(points), CONSTANT),
             "spread": np.sqrt((spread[:, :2] ** 2).mean(1)),
             "spread_depth": spread[:, 2],
-            "mirrored": self._chains.mirrored(points),
             "turned": np.full(len(points), abs(at["left_shoulder"][2] - at["right_shoulder"][2])),
             "bowed": np.full(len(points), abs(at["neck"][2] - at["pelvis"][2])),
             "surprise": surprise(points, seconds, trail),
@@ -124,7 +121,6 @@ class MonocularDoubt:
         }
         components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}
         components["alternative"] = images.displacements(points)
-        components["together"] = self._mirrors.together(state.pose, points, observation).displacements(points, TOGETHER_ALLOWED)
         components["distance"] = points * (0, 0, DISTANCE)
         unseen = {limb: max(hidden, cut) for limb, (hidden, _, _, cut) in shares.items()}
         since = before.since if still and before is not None else seconds
@@ -135,10 +131,6 @@ class MonocularDoubt:
     def names(self) -> tuple[str, ...]:
         """Names of the L landmarks."""
         return self.tracker.picture.body.landmark_names
-
-    @cached_property
-    def _chains(self) -> Chains:
-        return Chains.of(self.names)
 
     @cached_property
     def _mirrors(self) -> Mirrors:
@@ -196,37 +188,3 @@ class MonocularDoubt:
         root = self.names.index("neck") if limb == "trunk" else own[0]
         length = TRUNK_REACH if limb == "trunk" else REACH * float(np.sqrt((np.diff(points[own], axis=0) ** 2).sum(1)).sum())
         return pixels[root], length * focal / points[root, 2]
-
-
-CHAINS = {"elbow": ("shoulder", "elbow"), "wrist": ("shoulder", "elbow", "wrist"), "hand": ("shoulder", "elbow", "wrist"),
-          "fist": ("shoulder", "elbow", "wrist"), "knee": ("hip", "knee"), "ankle": ("hip", "knee", "ankle")}
-"""Joints from a limb's root on whose directions a joint's place depends."""
-
-
-@dataclass(frozen=True, eq=False)
-class Chains:
-    """The bones from the limbs' roots to their joints."""
-
-    starts: NDArray[np.int64]
-    """Landmark at each bone's beginning (B,)."""
-    ends: NDArray[np.int64]
-    bears: Array
-    """1 where a landmark's place depends on a bone's direction, (L, B)."""
-
-    @classmethod
-    def of(cls, names: Sequence[str]) -> Chains:
-        """The chains among landmarks, by their names."""
-        chains = []
-        for name in names:
-            side, _, joint = name.partition("_")
-            chains.append([(f"{side}_{a}", f"{side}_{b}") for a, b in pairwise(CHAINS.get(joint, ()))])
-        bones = list(dict.fromkeys(bone for chain in chains for bone in chain))
-        starts, ends = np.array([[names.index(a), names.index(b)] for a, b in bones]).reshape(-1, 2).T
-        bears = np.array([[bone in chain for bone in bones] for chain in chains], float)
-        return cls(starts, ends, bears)
-
-    def mirrored(self, points: Array) -> Array:
-        """How far in depth (L,), metres, landmarks (L, 3) move if the bones above them point as far to the front as to the back."""
-        bones, ends = points[self.ends] - points[self.starts], points[self.ends]
-        along = (bones * ends).sum(1) / np.sqrt((ends**2).sum(1))  # each bone's part along the view through its end
-        return np.sqrt(self.bears @ (2 * along) ** 2)
