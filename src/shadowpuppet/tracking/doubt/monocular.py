@@ -30,8 +30,6 @@ THIN = 0.03
 """Half width of what an inaccurate outline may leave over, as a share of the root of the person's area."""
 DISTANCE = 0.02
 """Standard deviation of the person's distance, over it: who is measured does not stand exactly where it was measured."""
-GOOD_MISFIT = 0.05
-"""Share of the pixels that differ though the pose is right."""
 REACH = 1.1
 """Radius about a limb's root, over the limb's length, in which unexplained silhouette may be this limb's."""
 TRUNK_REACH = 1.0
@@ -87,10 +85,9 @@ class MonocularDoubt:
 
         Axes are the camera's: x right, y down, z forward. Of every joint there are: a constant; the particles' spread across and along
         the view; the depth by which the trunk turns, and bows; of its limb, the hidden share, the silhouette near it that nothing explains,
-        the share outside the silhouette and the share outside the picture, times the joint's lever; the same of what does not match the
-        arm's colours, if they are known, by which the hidden share is then multiplied; how far it left its course; the misfit of the whole
-        body; how long the silhouette has not changed; the distances to the mirror images of each arm; and the error of the person's
-        distance.
+        the share outside the silhouette and the share outside the picture, times the joint's lever, the hidden share of an arm times what
+        does not match its colours, if they are known; how far it left its course; how long the silhouette has not changed; the distances to
+        the mirror images of each arm; and the error of the person's distance.
         """
         points = self.tracker.picture.points(state.pose[None])[0]
         at, lever = dict(zip(self.names, points)), levers_of(self.names)
@@ -103,10 +100,9 @@ class MonocularDoubt:
         images = self._mirrors.images(state.pose, points, observation)
         shares = self._shares(state.pose, points, mask, unpack(observation.ignore, mask.shape[1]))
         arms = None if state.observation is None else state.observation.arms
-        mismatch = {} if arms is None else self.tracker.arm_colours.mismatch(arms, state.pose)
-        for limb, share in mismatch.items():  # its colours show an arm before the trunk
+        for limb, share in ({} if arms is None else self.tracker.arm_colours.mismatch(arms, state.pose)).items():
             hidden, unexplained, outside, cut = shares[limb]
-            shares[limb] = (hidden * min(share, 1.0), unexplained, outside, cut)
+            shares[limb] = (hidden * share, unexplained, outside, cut)  # its colours show an arm before the trunk
         columns = np.array([shares.get(limb_of(name), (0.0,) * 4) for name in self.names]) * lever[:, None]
         found = dict(zip(("hidden", "unexplained", "outside", "cut"), columns.T)) | {
             "constant": np.full(len(points), CONSTANT),
@@ -115,9 +111,7 @@ class MonocularDoubt:
             "turned": np.full(len(points), abs(at["left_shoulder"][2] - at["right_shoulder"][2])),
             "bowed": np.full(len(points), abs(at["neck"][2] - at["pelvis"][2])),
             "surprise": surprise(points, seconds, trail),
-            "misfit": np.fmax(1 - state.overlap - GOOD_MISFIT, 0) * lever,
             "still": stillness(still) * lever,
-            "coloured": np.array([mismatch.get(limb_of(name), 0.0) for name in self.names]) * lever,
         }
         components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}
         components["alternative"] = images.displacements(points)
