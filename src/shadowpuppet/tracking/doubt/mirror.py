@@ -16,6 +16,7 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.motion import Mode
+from shadowpuppet.tracking.doubt.doubt import STEP
 from shadowpuppet.tracking.doubt.variance import variance_model
 from shadowpuppet.tracking.monocular.settings import pixel_scale
 from shadowpuppet.tracking.silhouette_cost import Observation
@@ -24,8 +25,6 @@ FLIPS = ((-1, -1), (-1, 1), (1, -1))
 """Bones whose part along the view changes its sign: both, the upper arm, the forearm."""
 STEPS, DAMPING = 6, 1e-3
 """Steps of the search for a mirror image within the joints' limits, and their damping (m^2)."""
-DERIVATIVE = 1e-3
-"""Step of its derivatives, rad."""
 ALLOWED = 60.0
 """A mirror image counts half in the joints' variances if it costs this much more (pixels at 320 x 240), times ln 3."""
 APART = 0.1
@@ -106,10 +105,10 @@ class Mirrors:
         rows, (number, width) = np.arange(len(poses)), dofs.shape
         for _ in range(STEPS):
             tried = np.repeat(poses[:, None], width + 1, axis=1)
-            tried[rows[:, None], np.arange(1, width + 1), dofs] += DERIVATIVE
+            tried[rows[:, None], np.arange(1, width + 1), dofs] += STEP
             at = self.picture.points(tried.reshape(-1, poses.shape[1])).reshape(number, width + 1, -1, 3)
             at = at[rows[:, None, None], np.arange(width + 1)[:, None], ends[:, None]].reshape(number, width + 1, -1)
-            J, off = (at[:, 1:] - at[:, :1]) / DERIVATIVE, targets - at[:, 0]
+            J, off = (at[:, 1:] - at[:, :1]) / STEP, targets - at[:, 0]
             step = np.linalg.solve(J @ J.transpose(0, 2, 1) + DAMPING * np.eye(width), J @ off[:, :, None])[..., 0]
             moved = poses[rows[:, None], dofs] + np.clip(step, -1.0, 1.0)
             poses[rows[:, None], dofs] = np.clip(moved, low[dofs], high[dofs])
