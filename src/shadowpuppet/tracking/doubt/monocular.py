@@ -18,7 +18,7 @@ from shadowpuppet.motion.limbs import LIMBS, joints_of_limbs, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import levers_of, limb_of_part
 from shadowpuppet.tracking.doubt.mirror import Mirrors
-from shadowpuppet.tracking.doubt.steps import CONSTANT, Trail, stillness, surprise
+from shadowpuppet.tracking.doubt.steps import CONSTANT, stillness
 from shadowpuppet.tracking.frozen import is_frozen, same_silhouette
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 
@@ -44,9 +44,6 @@ body that keeps its height can only imitate so. The silhouette may fit all the s
 class Before(NamedTuple):
     """What the next frame needs of this one."""
 
-    seconds: float
-    trail: Trail
-    """Of the landmarks, camera's frame."""
     mask: Mask
     """Silhouette (H, W)."""
     still: int
@@ -86,13 +83,12 @@ class MonocularDoubt:
         Axes are the camera's: x right, y down, z forward. Of every joint there are: a constant; the particles' spread across and along
         the view; the depth by which the trunk turns, and bows; of its limb, the hidden share, the silhouette near it that nothing explains,
         the share outside the silhouette and the share outside the picture, times the joint's lever, the hidden share of an arm times what
-        does not match its colours, if they are known; how far it left its course; how long the silhouette has not changed; the distances to
+        does not match its colours, if they are known; how long the silhouette has not changed; the distances to
         the mirror images of each arm; and the error of the person's distance.
         """
         points = self.tracker.picture.points(state.pose[None])[0]
         at, lever = dict(zip(self.names, points)), levers_of(self.names)
         still = before.still + 1 if before is not None and same_silhouette(before.mask, mask) else 0
-        trail = Trail() if before is None else before.trail
         spread = self._spread(state, points)
         # what is left out beside the body is no evidence for a pose, but one against the limbs near it
         known = state.observation if state.unexplained is None else None
@@ -110,7 +106,6 @@ class MonocularDoubt:
             "spread_depth": spread[:, 2],
             "turned": np.full(len(points), abs(at["left_shoulder"][2] - at["right_shoulder"][2])),
             "bowed": np.full(len(points), abs(at["neck"][2] - at["pelvis"][2])),
-            "surprise": surprise(points, seconds, trail),
             "still": stillness(still) * lever,
         }
         components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}
@@ -119,7 +114,7 @@ class MonocularDoubt:
         unseen = {limb: max(hidden, cut) for limb, (hidden, _, _, cut) in shares.items()}
         since = before.since if still and before is not None else seconds
         evidence = Evidence(components, unseen, is_frozen(still, seconds - since), self._mirrors.modes(points, images))
-        return evidence, Before(seconds, trail.with_frame(seconds, points), mask, still, since)
+        return evidence, Before(mask, still, since)
 
     @property
     def names(self) -> tuple[str, ...]:
