@@ -14,14 +14,13 @@ from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.io.run_writer import RunWriter
 from shadowpuppet.motion.motion import BLANK, Motion
 from shadowpuppet.pipeline.findings.look import Survey
-from shadowpuppet.pipeline.footage import CameraFrame
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.progress import FALLBACK_RATE, Listener
 from shadowpuppet.pipeline.rig import FrameSet, read_frames
 from shadowpuppet.pipeline.silhouette_cache import MaskStore
+from shadowpuppet.pipeline.silhouettes import segments_of
 from shadowpuppet.pipeline.subject import Before, Observation, State, TrackedSubject
-from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.video import Image, write_frames
 
 Draw = Callable[[FrameSet], Image]
@@ -57,17 +56,13 @@ def drawings(subject: TrackedSubject[State, Observation, Before], motion: Motion
 def _pictured(survey: Survey, options: Options, store: MaskStore) -> Generator[FrameSet]:
     """The frame sets of a run, with pictures as the cameras would take them without their movement."""
     if store.sets:
-        with closing(read_frames(survey.rig, [_unsegmented] * len(survey.rig.footage), every=options.every)) as read:
+        with closing(read_frames(survey.rig, segments_of(survey.rig, ()), every=options.every)) as read:
             yield from (_steadied(survey, kept._replace(images=now.images)) for now, kept in zip(read, store))
     else:
         with closing(frames_beside(Task(survey.rig, survey.silhouettes, options.masks, options.every, corrected=False))) as made:
             yield from (_steadied(survey, now) for now in made)
 
 
-def _unsegmented(frame: CameraFrame) -> Segmented:
-    return Segmented(np.zeros(frame.image.shape[:2], bool))
-
-
 def _steadied(survey: Survey, now: FrameSet) -> FrameSet:
     images = (None if image is None else each.steadied(image) for each, image in zip(survey.silhouettes, now.images))
-    return now._replace(images=tuple(images))
+    return now._replace(images=tuple(images) or now.images)
