@@ -192,7 +192,7 @@ def track_monocular(path: Path) -> Iterator[Tracked]:
                       off, np.array(deviations), np.array(statuses), model.modes)
 
 
-SIGHTINGS = (("mediapipe", False), ("mediapipe", True), ("made", False), ("poor", False), ("poor", True))
+SIGHTINGS = (("mediapipe", False), ("mediapipe", True), ("poor", False), ("poor", True))
 """Detectors, and whether two cameras alone are used."""
 BESIDE = ("second person", "obstacle", "thing", "grown")
 """Faults of silhouettes that are tried beside keypoints."""
@@ -212,7 +212,8 @@ def track_multiview(path: Path, evidence: str = "silhouettes") -> Iterator[Track
     for detector, paired in SIGHTINGS:
         known = with_keypoints(path, detector)
         options = {"evidence": evidence} | ({"camera": ",".join(across(known))} if paired else {})
-        faults = {name: FAULTS[name] for name in ("clean", *(BESIDE if "silhouettes" in evidence and not paired else ()))}
+        beside = BESIDE if "silhouettes" in evidence and detector == "mediapipe" and not paired else ()
+        faults = {name: FAULTS[name] for name in ("clean", *beside)}
         for run in tracked_with(known, make_options(options), faults):
             said = f"{detector}, {run.fault}" if run.fault != "clean" or detector != "mediapipe" else "clean"
             yield replace(run, recording=path.name, fault=f"{said}, two cameras" if paired else said)

@@ -208,6 +208,10 @@ def check_used(options: Options, several: bool) -> None:
     idle = [name for key in (OF_ONE if several else OF_SEVERAL) for name in _changed(key, usual[key], now[key])]
     if idle:
         warn(f"no effect with {cameras}: {', '.join(idle)}")
+    if not options.uses_silhouettes:
+        unused = [name for name in ("background", "masks", "region", "silhouette") if getattr(options, name) != getattr(Options(), name)]
+        if unused:
+            warn(f"no effect with keypoints alone: {', '.join(unused)}")
     if options.label is not None and not options.masks:
         warn("no effect without ready silhouettes (--masks): label")
 

@@ -92,7 +92,7 @@ class MultiviewDoubt:
         if keypoints is not None:
             shown = keypoint_view(body, state.pose, keypoints)
             found, unseen = found | shown.components, 1 - shown.known
-        if any(mask is not None for mask in masks):
+        if keypoints is None or any(mask is not None for mask in masks):
             shares = self._limb_shares(state.pose, surface, masks)
             shares[:, :4] *= unseen[:, None]
             by_joint, unseen = shares[self._limbs_of_joints].T, shares[:, 0]

@@ -41,6 +41,8 @@ from shadowpuppet.tracking.unexplained import Unexplained, look_beside
 
 ARM_COLOURS = 0.1
 """`MultiviewSettings.arm_colours` of few cameras."""
+CONTRADICTION = 0.4
+"""Difference of overlap and support from which on silhouettes and keypoints are of different things."""
 WELL = 0.75
 """Least overlap of body and silhouettes at which colours are learnt."""
 MIN_POINTS, MIN_EXTENT = 50, 0.5
@@ -83,8 +85,8 @@ class MultiviewState(NamedTuple):
 
     @property
     def agreement(self) -> float:
-        """The overlap, or the support where there are no silhouettes: the measure of a loss."""
-        return self.support if np.isnan(self.overlap) else self.overlap
+        """The overlap, or the support where that is greater: furniture in silhouettes and a poor detector are no loss."""
+        return float(np.fmax(self.overlap, self.support))
 
 
 @dataclass(frozen=True, eq=False)
@@ -323,7 +325,8 @@ class MultiviewTracker:
         cost, overlap = float(weigh(pose[None])[0][0]), observation.overlap(pose)
         support = np.nan if observation.keypoints is None else observation.keypoints.support(pose)
         found = MultiviewState(pose, velocity, particles, cost, overlap, "", support=support)
-        return found._replace(status=status_of(found.agreement))
+        status = status_of(found.agreement)
+        return found._replace(status="uncertain" if status == "tracked" and abs(overlap - support) > CONTRADICTION else status)
 
     def is_present(self, observation: MultiviewObservation) -> bool:
         """Whether the surface points are enough, and extended enough, for a person; or, without silhouettes, the keypoints."""
