@@ -175,7 +175,7 @@ def _single_frames(rig: Rig, segment: Segment, ready: bool, every: int) -> Gener
             return
         decoded = time.perf_counter()
         found = segment(frame)
-        seen = Seen((found.mask,), codes=(colour_codes(found.image),))
+        seen = Seen((found.mask,), codes=(colour_codes(found.image),), keypoints=() if frame.keypoints is None else (frame.keypoints,))
         yield FrameSet(frame.time, (frame.image,), seen, decoded - start, time.perf_counter() - decoded)
 
 

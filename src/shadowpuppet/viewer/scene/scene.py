@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS
 from shadowpuppet.motion.mesh import Mesh
@@ -143,6 +144,8 @@ class SceneCamera:
     camera: Camera
     """For pictures of the size of `images`."""
     images: CameraImages | None = None
+    keypoints: Callable[[float], Keypoints] | None = None
+    """What a detector found at a time of the recording (s), in pixels of these pictures; None: there was none."""
 
 
 @dataclass(frozen=True, eq=False)

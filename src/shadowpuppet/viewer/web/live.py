@@ -76,7 +76,7 @@ class LiveSpace:
         rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))[0]
         figure = self.figure(rest if view.pose is None else view.pose)
         scene = Stage(title="live", times=NOW, figures=(figure,), cameras=self._cameras)
-        return content(scene, self._lenses, None, True, np.arange(1)) | {"number": self.number, "film": len(self._cameras) == 1}
+        return content(scene, self._lenses, None, np.arange(1)) | {"number": self.number, "film": len(self._cameras) == 1}
 
     def puppet(self, view: SessionState) -> dict[str, Any] | None:
         """The body's motion for the stage; None without a trustworthy pose."""
