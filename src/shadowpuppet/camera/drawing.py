@@ -30,7 +30,7 @@ CROSS: Words = (("cross: keypoint", WHITE),)
 """Keypoints in words."""
 SHOWN = 0.5
 """Opacity of the model where the picture behind it is to be seen."""
-DASH = 6
+DASH = 9
 """Length of the dashes and gaps of a doubtful limb's lines, in pictures 240 pixels high, pixels."""
 MATCHING = np.array([BLACK, MODEL_ONLY, SILHOUETTE_ONLY, WHITE, (40, 40, 40), (40, 40, 40), GREY, GREY], np.uint8)
 """Colours of the matching row, indexed by model + 2 silhouette + 4 ignored."""
@@ -100,7 +100,7 @@ def draw_model(image: Image, picture: Picture, pose: Array, doubtful: Container[
         is_doubtful = piece.part in doubtful
         for corners, colour in () if is_doubtful else piece.fills:
             cv2.fillConvexPoly(image, _fixed(corners), colour, cv2.LINE_AA, SUBPIXEL)
-        draw_line(image, piece.edge, colour_of(piece.part) if is_doubtful else (25, 25, 25), width, is_doubtful)
+        draw_line(image, piece.edge, colour_of(piece.part) if is_doubtful else (25, 25, 25), width + is_doubtful, is_doubtful)
 
 
 def draw_skeleton(image: Image, picture: Picture, pose: Array, doubtful: Container[str] = ()) -> None:
@@ -131,11 +131,17 @@ def draw_line(image: Image, points: Array, colour: Colour, width: int, dashed: b
     parts = [points]
     if dashed and along[-1] < 10 * image.shape[0]:  # else it is mostly far outside the picture
         pieces = 2 * round(along[-1] / (2 * DASH * _unit(image))) + 1  # odd: a dash at both ends
-        ends = np.linspace(0, along[-1], pieces + 1)
-        places = np.stack([np.interp(ends, along, each) for each in points.T], 1)
-        parts = [np.concatenate([places[n : n + 1], points[(along > ends[n]) & (along < ends[n + 1])], places[n + 1 : n + 2]])
-                 for n in range(0, pieces, 2)]
+        starts, stops = np.linspace(0, along[-1], pieces + 1).reshape(-1, 2).T
+        starts[1:] += width / 2  # a line ends in a round cap
+        stops[:-1] = np.maximum(stops[:-1] - width / 2, starts[:-1])
+        parts = [np.array([*_between(points, along, start), *points[(along > start) & (along < stop)], *_between(points, along, stop)])
+                 for start, stop in zip(starts, stops)]
     cv2.polylines(image, list(map(_fixed, parts)), False, colour, width, cv2.LINE_AA, SUBPIXEL)
+
+
+def _between(points: Array, along: Array, where: float) -> Array:
+    """The pixel (1, 2) at a length along the line through pixels (K, 2) that lie at lengths `along` (K,)."""
+    return np.array([[np.interp(where, along, each) for each in points.T]])
 
 
 def draw_keypoints(image: Image, keypoints: Keypoints) -> None:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.camera.mask import half_size
-from shadowpuppet.errors import ShadowPuppetError, warn
+from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, warn
 from shadowpuppet.pipeline.rig import FrameSet, Rig, read_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.threads import child_environment, usable_cores
@@ -84,7 +84,7 @@ class _Message(NamedTuple):
     """What the process sends: a frame set, an error, or neither at the end."""
 
     seen: FrameSet | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[tuple[str, type[Warning]], ...] = ()
     error: Exception | None = None
 
 
@@ -112,8 +112,11 @@ def _received(packed: bytes) -> Generator[FrameSet]:
     thread.start()
     try:
         while (message := _next(messages, thread)) is not None:
-            for each in message.warnings:
-                warn(each)
+            for text, category in message.warnings:
+                if issubclass(category, ShadowPuppetWarning):
+                    warn(text)
+                else:
+                    warnings.warn(text, category, stacklevel=2)
             if message.error is not None:
                 raise message.error
             if message.seen is None:
@@ -199,8 +202,8 @@ def main() -> None:
             _write(made, _Message(warnings=_taken(caught), error=error))
 
 
-def _taken(caught: list[warnings.WarningMessage]) -> tuple[str, ...]:
-    """The texts of caught warnings, which are then forgotten."""
-    texts = tuple(str(each.message) for each in caught)
+def _taken(caught: list[warnings.WarningMessage]) -> tuple[tuple[str, type[Warning]], ...]:
+    """The texts and categories of caught warnings, which are then forgotten."""
+    taken = tuple((str(each.message), each.category) for each in caught)
     caught.clear()
-    return texts
+    return taken

@@ -214,6 +214,7 @@ class PeopleRun:
                     self.store.add(now.time, seen)
                 if (known := next(earlier, None)) is not None:
                     judged(*known)
+                    began = time.perf_counter()
                     continue
                 timer.add(decode=now.decoding, segment=now.segmenting, hull=now.carving)
                 with timer.time("hull"):
