@@ -82,7 +82,7 @@ class SceneFigure:
     joint_sd: Array | None = None
     """Their standard deviations along the world's axes, of shape (T, K, 3), metres."""
     bones: tuple[tuple[int, int], ...] = ()
-    """Pairs of these joints with a line between them, where a figure is drawn as lines."""
+    """Pairs of these joints with a line between them, where a figure is drawn as lines, or a camera is looked through."""
     limbs: tuple[str, ...] = ()
     """Limbs, of `LIMBS`, with a status."""
     limb_status: NDArray[np.str_] | None = None

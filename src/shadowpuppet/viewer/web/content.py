@@ -18,6 +18,7 @@ from shadowpuppet.camera.captions import Colour
 from shadowpuppet.camera.drawing import MIDDLE_COLOUR, SIDE_COLOURS
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.intervals import HALF_WIDTH
+from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.motion.motion import STATUSES
 from shadowpuppet.viewer.scene.scene import Chart, SceneCamera, SceneFigure, Stage
 from shadowpuppet.viewer.scene.strip import Strip, doubtful_moments, strips_of
@@ -90,6 +91,8 @@ def _figure(figure: SceneFigure, times: Array) -> dict[str, Any]:
     found = motion_content(figure, times) | {
         "name": figure.name, "kind": figure.kind, "shift": figure.shift, "joints": figure.places.shape[1],
         "jointNames": [name.replace("_", " ") for name in figure.joint_names], "bones": figure.bones,
+        "jointLimbs": [LIMBS.index(limb_of(name)) for name in figure.joint_names],
+        "jointSides": [_side(name) for name in figure.joint_names],
         "limbs": 0 if figure.doubtful is None else figure.doubtful.frames.shape[1],
     }  # fmt: skip
     if figure.kind == "truth" and figure.joints is not None and figure.bones:
@@ -128,13 +131,19 @@ def _keypoints(each: SceneCamera, lens: Undistorter, times: Array) -> dict[str, 
     found = [] if each.keypoints is None else [each.keypoints(float(time)) for time in times]
     if not found:
         return {}
-    sides = [("left", "right").index(side) + 1 if (side := name.split("_")[0]) in SIDE_COLOURS else 0 for name in found[0].names]
+    sides = [_side(name) for name in found[0].names]
     people, half = max(len(one.xy) for one in found), np.array([lens.aspect, 1.0]) * np.tan(lens.fov / 2)
     out = np.zeros((len(found), people * len(sides), 3))
     for one, place in zip(found, out):
         known = np.column_stack([each.camera.rays(one.xy)[..., :2].reshape(-1, 2) / half, one.confidence.ravel()])
-        place[: len(known)] = np.where((np.abs(known) <= 1).all(1)[:, None], known, 0)
+        place[: len(known)] = np.where((np.abs(known) <= 1).all(1, keepdims=True), known, 0)
     return {"sides": sides * people, "keypoints": packed(10_000 * out, "i2")}
+
+
+def _side(name: str) -> int:
+    """Index of a landmark's colour in `sides`."""
+    side = name.partition("_")[0]
+    return list(SIDE_COLOURS).index(side) + 1 if side in SIDE_COLOURS else 0
 
 
 def _hex(colour: Colour) -> str:

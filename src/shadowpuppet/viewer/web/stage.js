@@ -40,14 +40,14 @@ void main() {
 const BODY_FRAGMENT = `#version 300 es
 precision highp float;
 in vec3 outward; in vec3 paint; in float faint;
-uniform vec3 toward; uniform vec3 fade; uniform float scale;
+uniform vec3 toward; uniform vec3 fade; uniform float scale; uniform float opacity;
 out vec4 seen;
 void main() {
   if (faint > 0.5 && mod(gl_FragCoord.x + gl_FragCoord.y, 8.0 * scale) < 4.0 * scale) discard;
   vec3 n = normalize(outward);
   if (dot(n, toward) < 0.0) n = -n;
   float light = 0.50 + 0.16 * n.z + 0.38 * max(dot(n, normalize(toward + vec3(0.25, 0.15, 0.55))), 0.0);
-  seen = vec4(mix(paint * light, fade, faint * 0.2), 1);
+  seen = vec4(mix(paint * light, fade, faint * 0.2), opacity);
 }`;
 const LINE_VERTEX = `#version 300 es
 in vec2 corner; in vec3 start; in vec3 end; in vec4 colour; in float width;
@@ -78,7 +78,7 @@ precision highp float; in vec2 where; uniform sampler2D pictures; uniform sample
 uniform vec3 person; uniform float opacity; out vec4 seen;
 void main() {
   float inside = texture(silhouettes, where).r;
-  vec3 dimmed = texture(pictures, where).rgb * (shown.y > 0.5 ? mix(0.5, 1.0, inside) : 1.0);
+  vec3 dimmed = texture(pictures, where).rgb * (shown.y > 0.5 ? mix(0.65, 1.0, inside) : 1.0);
   seen = shown.x > 0.5 ? vec4(dimmed, opacity) : vec4(person, mix(0.10, 0.85, inside) * opacity);
 }`;
 const LAYERS = ["pictures", "silhouettes"];
@@ -86,7 +86,7 @@ const LAYERS = ["pictures", "silhouettes"];
 class Stage {
   constructor(data, canvas, labels, acts) {
     this.data = data; this.canvas = canvas; this.labels = labels; this.acts = acts;
-    this.gl = canvas.getContext("webgl2", {antialias: true});
+    this.gl = canvas.getContext("webgl2", {antialias: true, alpha: false});
     if (!this.gl) throw new Error("this browser shows no WebGL 2");
     this.programs = {
       body: this.program(BODY_VERTEX, BODY_FRAGMENT), line: this.program(LINE_VERTEX, LINE_FRAGMENT),
@@ -310,7 +310,7 @@ class Stage {
     }
     gl.disable(gl.DEPTH_TEST);
     const crosses = this.through === null ? [] : this.crossLines(this.cameras[this.through], frame);
-    this.drawLines([...crosses, ...this.rays(frame), ...this.particleLines(), ...this.figures.flatMap(each => this.linesOf(each, frame))], matrix);
+    this.drawLines([...this.rays(frame), ...this.particleLines(), ...this.figures.flatMap(each => this.linesOf(each, frame)), ...crosses], matrix);
     this.place(matrix);
   }
   // Index of a figure's own frame that is shown at a frame of the timeline; -1 for none.
@@ -337,6 +337,7 @@ class Stage {
     gl.uniform3fv(this.uniform(program, "toward"), this.axes()[2]);
     gl.uniform3fv(this.uniform(program, "fade"), this.paint("--paper"));
     gl.uniform1f(this.uniform(program, "scale"), this.scale);
+    gl.uniform1f(this.uniform(program, "opacity"), this.through === null ? 1 : 0.5);
     gl.bindVertexArray(figure.array);
     gl.drawElements(gl.TRIANGLES, figure.corners, gl.UNSIGNED_INT, 0);
     gl.bindVertexArray(null);
@@ -441,7 +442,15 @@ class Stage {
   linesOf(figure, frame) {
     const n = this.at(figure, frame), out = [];
     if (n < 0) return out;
-    const truth = figure.kind == "truth";
+    const truth = figure.kind == "truth", over = this.through !== null && !truth;
+    if (over)  // the body shows what is behind it: its bones in the sides' colours, those of doubtful limbs dashed
+      for (const [width, paint] of [[3.6, () => "#000000"], [2.6, joint => this.data.sides[figure.jointSides[joint]]]])
+        for (const [a, b] of figure.bones) {
+          const [start, end] = [this.joint(figure, n, a), this.joint(figure, n, b)], along = start && end && V.sub(end, start);
+          const pieces = figure.doubtful && figure.doubtful[n * figure.limbs + figure.jointLimbs[b]] ? 7 : 1;
+          for (let k = 0; along && k < pieces; k += 2)
+            out.push([V.add(start, along, k / pieces), V.add(start, along, (k + 1) / pieces), [...hexColour(paint(b)), 1], width]);
+        }
     if (truth && !figure.array)
       for (const [width, colour] of [[1.9, [...this.paint("--paper"), 0.9]], [0.9, [...this.paint("--truth"), 1]]])
         for (const [a, b] of figure.bones) {
