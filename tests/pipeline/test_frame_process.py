@@ -110,8 +110,9 @@ def test_warnings_of_libraries_stay_theirs():
         warnings.warn("overflow encountered in cast", RuntimeWarning, stacklevel=1)
         warn("the film breaks off")
         taken = _taken(caught)
-    assert pickle.loads(pickle.dumps(taken)) == (("overflow encountered in cast", RuntimeWarning),
-                                                 ("the film breaks off", ShadowPuppetWarning))
+    sent = pickle.loads(pickle.dumps(taken))
+    assert [(str(each), type(each)) for each in sent] == [("overflow encountered in cast", RuntimeWarning),
+                                                          ("the film breaks off", ShadowPuppetWarning)]
     assert caught == []
 
 

@@ -568,7 +568,7 @@ def test_keypoints_are_crosses_where_the_undistorted_picture_has_them(fisheye, r
     data = content(page_text(scene, [lens], None))
     (own,) = data["cameras"]
     assert own["sides"] == [1, 2, 0, 1, 2, 0]
-    assert data["sides"][1:] == ["#{:02x}{:02x}{:02x}".format(*colour[::-1]) for colour in SIDE_COLOURS.values()]
+    assert data["sides"][1:] == [[*colour[::-1]] for colour in SIDE_COLOURS.values()]
     marks = unpacked(own["keypoints"]).reshape(3, 6, 3) / 10_000
     for n, each in enumerate(points):
         assert marks[n, :, 2].tolist() == [*sure[n].ravel(), *[0] * (6 - each[..., 0].size)]

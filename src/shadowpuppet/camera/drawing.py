@@ -134,14 +134,9 @@ def draw_line(image: Image, points: Array, colour: Colour, width: int, dashed: b
         starts, stops = np.linspace(0, along[-1], pieces + 1).reshape(-1, 2).T
         starts[1:] += width / 2  # a line ends in a round cap
         stops[:-1] = np.maximum(stops[:-1] - width / 2, starts[:-1])
-        parts = [np.array([*_between(points, along, start), *points[(along > start) & (along < stop)], *_between(points, along, stop)])
-                 for start, stop in zip(starts, stops)]
+        ends = [np.array([start, *along[(along > start) & (along < stop)], stop]) for start, stop in zip(starts, stops)]
+        parts = [np.stack([np.interp(each, along, axis) for axis in points.T], 1) for each in ends]
     cv2.polylines(image, list(map(_fixed, parts)), False, colour, width, cv2.LINE_AA, SUBPIXEL)
-
-
-def _between(points: Array, along: Array, where: float) -> Array:
-    """The pixel (1, 2) at a length along the line through pixels (K, 2) that lie at lengths `along` (K,)."""
-    return np.array([[np.interp(where, along, each) for each in points.T]])
 
 
 def draw_keypoints(image: Image, keypoints: Keypoints) -> None:

@@ -84,7 +84,7 @@ class _Message(NamedTuple):
     """What the process sends: a frame set, an error, or neither at the end."""
 
     seen: FrameSet | None = None
-    warnings: tuple[tuple[str, type[Warning]], ...] = ()
+    warnings: tuple[Warning | str, ...] = ()
     error: Exception | None = None
 
 
@@ -112,11 +112,11 @@ def _received(packed: bytes) -> Generator[FrameSet]:
     thread.start()
     try:
         while (message := _next(messages, thread)) is not None:
-            for text, category in message.warnings:
-                if issubclass(category, ShadowPuppetWarning):
-                    warn(text)
+            for each in message.warnings:
+                if isinstance(each, ShadowPuppetWarning):
+                    warn(str(each))
                 else:
-                    warnings.warn(text, category, stacklevel=2)
+                    warnings.warn(each, stacklevel=2)
             if message.error is not None:
                 raise message.error
             if message.seen is None:
@@ -202,8 +202,8 @@ def main() -> None:
             _write(made, _Message(warnings=_taken(caught), error=error))
 
 
-def _taken(caught: list[warnings.WarningMessage]) -> tuple[tuple[str, type[Warning]], ...]:
-    """The texts and categories of caught warnings, which are then forgotten."""
-    taken = tuple((str(each.message), each.category) for each in caught)
+def _taken(caught: list[warnings.WarningMessage]) -> tuple[Warning | str, ...]:
+    """Caught warnings, which are then forgotten."""
+    taken = tuple(each.message for each in caught)
     caught.clear()
     return taken

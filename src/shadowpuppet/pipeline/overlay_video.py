@@ -49,8 +49,7 @@ def _grid(frames: FrameSet, cameras: Sequence[Camera], people: Sequence[tuple[st
     keypoints = frames.seen.keypoints or (None,) * len(cameras)
     for n, camera in enumerate(cameras):
         rows, columns = grid.place(n)
-        name = strip(grid.width, [[(camera.name, WHITE)]])
-        out[rows.start - grid.header : rows.start, columns][: len(name)] = name
+        out[rows.start - grid.header : rows.start, columns] = strip(grid.width, [[(camera.name, WHITE)]], grid.header)
         image = frames.images[n]
         drawn = [(number, pictures[n], found) for number, found, pictures in people if found.pose is not None]
         _fit(out[rows, columns], None if image is None else _tile(image, frames.seen.masks[n], drawn, keypoints[n]))

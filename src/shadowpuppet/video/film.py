@@ -127,8 +127,7 @@ def _shown(path: Path, film: FrameSource, step: float, grey: bool, rate: float |
         nonlocal n, longest
         before, time = clock.last, clock(frame)
         if n > 10 and longest < 1.1 * step + 0.001 and time - before > 1.5 * step:  # steady so far, to the millisecond
-            warn(f"{path}: between {before:.3f} and {time:.3f} s frames are missing: the camera or the recorder left them out; with a "
-                 "lower rate or less compression it may not")
+            warn(f"{path}: between {before:.3f} and {time:.3f} s frames are missing: film at a lower rate or size if that recurs")
         longest, n = max(longest, time - before), n + 1
         return wanted(time_shown())
 
@@ -224,8 +223,7 @@ class _Clock:
     def __call__(self, frame: Stamped) -> float:
         stamp, base = self._stamp(frame), frame.time_base
         if stamp is None or base is None:
-            self._warn(self.last + self.step, f"has no time; times are filled in at {1 / self.step:g} frames/s: "
-                       "state another in recording.toml, as rate")
+            self._warn(self.last + self.step, f"has no time; times are filled in at {1 / self.step:g} frames/s (recording.toml: rate)")
             self.last += self.step
         else:
             self.zero = stamp if self.zero is None else self.zero

@@ -182,7 +182,7 @@ def _nearest_images(shots: Iterator, times: Array, frames: list[int]) -> Iterato
 
 def draw_bones(image: Image, camera: Camera, places: JointTable, own: bool = False, doubtful: Container[str] = ()) -> None:
     """Draw the bones of one frame into a picture (H, W, 3) of a camera, at any size; `own`: the run's, in the sides' colours, those to
-    `doubtful` joints dashed and pale; else thin and white."""
+    `doubtful` joints dashed; else thin and white."""
     pixels = dict(zip(places.names, _pixels(image, camera, places)))
     unit = image.shape[0] / 400
     for a, b in BONES:

@@ -140,8 +140,7 @@ class PeopleRun:
         for moment, each in found.items():
             said = [f"person {number} {status_in_words(frame.status, pictures[0].body.landmark_names, frame.limb_status)}"
                     for number, frame, pictures in each]  # fmt: skip
-            yield Drawing(partial(overlay_of_people, cameras=self.rig.cameras, people=each),
-                          f"{moment:.2f} s: {'; '.join(said) or 'no person yet'}")
+            yield partial(overlay_of_people, cameras=self.rig.cameras, people=each), f"{moment:.2f} s: {'; '.join(said) or 'no person yet'}"
 
     def _finished(self, number: int, truth: Path | None) -> dict[str, Any]:
         """The metrics of a person's finished run, written into its folder."""

@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -29,14 +28,8 @@ from shadowpuppet.pipeline.subject import Before, Observation, State, TrackedSub
 from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.video import Image, write_frames
 
-
-class Drawing(NamedTuple):
-    """What a run has in a frame set."""
-
-    draw: Callable[[FrameSet], Image]
-    """Draws it over the pictures."""
-    words: str
-    """Time and status, which stand below."""
+Drawing = tuple[Callable[[FrameSet], Image], str]
+"""Draws what a run has in a frame set over its pictures; and the words below them: time and status."""
 
 
 def show_run(writer: RunWriter, survey: Survey, options: Options, listener: Listener, store: MaskStore,
@@ -55,11 +48,11 @@ def show_run(writer: RunWriter, survey: Survey, options: Options, listener: List
     with write_frames(writer.folder / "overlay.mp4", rate) as film, closing(_pictured(survey, options, store)) as frames:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ShadowPuppetWarning)  # what reading the films warns of was said while they were tracked
-            for n, (now, drawing) in enumerate(zip(frames, chosen), 1):
-                picture = drawing.draw(now)
+            for n, (now, (draw, words)) in enumerate(zip(frames, chosen), 1):
+                picture = draw(now)
                 wide = picture.shape[1]
-                high = high or max(len(strip(wide, [legend, [(words, WHITE)]])) for words in {each.words for each in chosen})
-                film.write(np.concatenate([picture, strip(wide, [legend, [(drawing.words, WHITE)]], high)]))
+                high = high or max(len(strip(wide, [legend, [(each, WHITE)]])) for each in {said for _, said in chosen})
+                film.write(np.concatenate([picture, strip(wide, [legend, [(words, WHITE)]], high)]))
                 listener.advance(n)
         writer.check()  # before the overlay gets its name
     writer.metrics["overlay_s"] = round(time.perf_counter() - start, 3)
@@ -74,7 +67,7 @@ def drawings(subject: TrackedSubject[State, Observation, Before], motion: Motion
         if last is not None and last is not found:
             words = f"{found.status}; dashed: as at {last.time:.2f} s"
         fit = "" if np.isnan(found.overlap) else f", overlap {found.overlap:.2f}"
-        yield Drawing(partial(subject.draw, found=found, last=last), f"{found.time:.2f} s: {words}{fit}")
+        yield partial(subject.draw, found=found, last=last), f"{found.time:.2f} s: {words}{fit}"
 
 
 def _pictured(survey: Survey, options: Options, store: MaskStore) -> Generator[FrameSet]:

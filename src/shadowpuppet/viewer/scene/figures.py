@@ -37,10 +37,9 @@ def animation_figure(name: str, animation: Animation, mesh: Mesh | None = None, 
                      statuses: LimbStatuses | None = None, **more) -> SceneFigure:
     """Figure of a moving skeleton with a mesh, by default a stick along every bone. `more`: fields of `SceneFigure`."""
     places, turns = animation.world()
-    more = {"joints": places, "joint_names": animation.names} | more
-    more = {"bones": bones_of(more["joint_names"])} | more
+    own = {"joints": places, "joint_names": animation.names, "bones": bones_of(more.get("joint_names", animation.names))}
     return SceneFigure(name, animation.times, mesh or bone_mesh(animation), animation.rest, places, turns, kind,
-                  **_of_statuses(animation.names, statuses), **more)
+                  **_of_statuses(animation.names, statuses), **(own | more))
 
 
 def _of_statuses(names: Sequence[str], statuses: LimbStatuses | None) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.camera.captions import Colour
 from shadowpuppet.camera.drawing import MIDDLE_COLOUR, SIDE_COLOURS
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.intervals import HALF_WIDTH
@@ -75,7 +74,7 @@ def content(scene: Stage, cameras: Sequence[Undistorter], images: Images | None,
         "box": [low.tolist(), high.tolist()], "floor": scene.floor, "direction": (scene.viewpoint - scene.middle).tolist(),
         "figures": [_figure(figure, times) for figure in scene.figures],
         "cameras": [_camera(each, lens, n, times) for n, (each, lens) in enumerate(zip(scene.cameras, cameras))],
-        "images": images, "served": images is None, "sides": [_hex(colour) for colour in (MIDDLE_COLOUR, *SIDE_COLOURS.values())],
+        "images": images, "served": images is None, "sides": [colour[::-1] for colour in (MIDDLE_COLOUR, *SIDE_COLOURS.values())],
         "hull": images is None and scene.hull is not None, "particles": images is None and scene.cloud is not None,
         "charts": [_chart(chart, times) for chart in scene.charts],
         "strips": [_strip(strip, frames) for strip in strips_of(scene)],
@@ -144,11 +143,6 @@ def _side(name: str) -> int:
     """Index of a landmark's colour in `sides`."""
     side = name.partition("_")[0]
     return list(SIDE_COLOURS).index(side) + 1 if side in SIDE_COLOURS else 0
-
-
-def _hex(colour: Colour) -> str:
-    blue, green, red = colour
-    return f"#{red:02x}{green:02x}{blue:02x}"
 
 
 def _chart(chart: Chart, times: Array) -> dict[str, Any]:

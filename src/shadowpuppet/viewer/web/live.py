@@ -83,7 +83,7 @@ class LiveSpace:
         return None if view.pose is None else motion_content(self.figure(view.pose, view.doubtful), NOW)
 
     def figure(self, pose: Array, doubtful: frozenset[str] = frozenset()) -> SceneFigure:
-        """The body in a pose (D,), the limbs of `doubtful` landmarks pale."""
+        """The body in a pose (D,), the limbs of `doubtful` landmarks hatched."""
         names = self.body.landmark_names
         limbs, pale = limbs_of(names), {limb_of(name) for name in names if name in doubtful}
         statuses = LimbStatuses(limbs, np.array([["uncertain" if limb in pale else "tracked" for limb in limbs]]))

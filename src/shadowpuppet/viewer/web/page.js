@@ -153,7 +153,7 @@ class Page {
     id("person").className = film ? "over" : "";
     const arm = 0.05, slim = arm * camera.height / camera.width;
     id("marks").innerHTML = this.stage.crosses(this.stage.cameras[this.film], this.frame).map(([[x, y], colour, sure]) =>
-      `<path stroke="${colour}" stroke-opacity="${sure}" d="M${x - slim} ${y}h${2 * slim}M${x} ${y - arm}v${2 * arm}"/>`).join("");
+      `<path stroke="rgb(${colour})" stroke-opacity="${sure}" d="M${x - slim} ${y}h${2 * slim}M${x} ${y - arm}v${2 * arm}"/>`).join("");
   }
   // The newest image of each camera: at most one is asked for at a time, so that frames are skipped where films are read slowly.
   fetchImages() {

@@ -400,7 +400,7 @@ class Stage {
     gl.depthMask(true);
   }
 
-  // A detector's keypoints in a camera's picture: [x, y], from -1 to 1, the side's colour, the confidence.
+  // A detector's keypoints in a camera's picture: [x, y], from -1 to 1, the side's colour, 0..255, the confidence.
   crosses(camera, frame) {
     const {keypoints, sides} = camera, out = [];
     for (let k = 0; keypoints && this.shown.keypoints && k < sides.length; k++) {
@@ -412,11 +412,11 @@ class Stage {
   crossLines(camera, frame) {
     const arm = 0.03, slim = arm * camera.tan[1] / camera.tan[0], away = 0.99 * this.reach;
     return this.crosses(camera, frame).flatMap(([[x, y], colour, sure]) => [[slim, 0], [0, arm]].map(([dx, dy]) =>
-      [this.ahead(camera, away, [x - dx, y - dy]), this.ahead(camera, away, [x + dx, y + dy]), [...hexColour(colour), sure], 1]));
+      [this.ahead(camera, away, [x - dx, y - dy]), this.ahead(camera, away, [x + dx, y + dy]), [...colour.map(value => value / 255), sure], 1]));
   }
   rays(frame) {
     return !this.shown.rays ? [] : this.cameras.flatMap(camera => this.crosses(camera, frame).map(([at, colour, sure]) =>
-      [camera.centre, this.ahead(camera, Math.hypot(...V.sub(camera.centre, this.middle)) + this.size / 2, at), [...hexColour(colour), sure / 2], 0.6]));
+      [camera.centre, this.ahead(camera, Math.hypot(...V.sub(camera.centre, this.middle)) + this.size / 2, at), [...colour.map(value => value / 255), sure / 2], 0.6]));
   }
 
   floor() {
@@ -444,12 +444,12 @@ class Stage {
     if (n < 0) return out;
     const truth = figure.kind == "truth", over = this.through !== null && !truth;
     if (over)  // the body shows what is behind it: its bones in the sides' colours, those of doubtful limbs dashed
-      for (const [width, paint] of [[3.6, () => "#000000"], [2.6, joint => this.data.sides[figure.jointSides[joint]]]])
+      for (const [width, paint] of [[3.6, () => [0, 0, 0]], [2.6, joint => this.data.sides[figure.jointSides[joint]]]])
         for (const [a, b] of figure.bones) {
           const [start, end] = [this.joint(figure, n, a), this.joint(figure, n, b)], along = start && end && V.sub(end, start);
           const pieces = figure.doubtful && figure.doubtful[n * figure.limbs + figure.jointLimbs[b]] ? 7 : 1;
           for (let k = 0; along && k < pieces; k += 2)
-            out.push([V.add(start, along, k / pieces), V.add(start, along, (k + 1) / pieces), [...hexColour(paint(b)), 1], width]);
+            out.push([V.add(start, along, k / pieces), V.add(start, along, (k + 1) / pieces), [...paint(b).map(value => value / 255), 1], width]);
         }
     if (truth && !figure.array)
       for (const [width, colour] of [[1.9, [...this.paint("--paper"), 0.9]], [0.9, [...this.paint("--truth"), 1]]])
