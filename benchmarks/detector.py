@@ -33,6 +33,8 @@ class Detector(NamedTuple):
 
 USUAL = Detector()
 EXACT = Detector(0.0, 0.4, 0.0, 0.0, 0.0, 0.0)
+DETECTORS = {"made": USUAL, "poor": Detector(scale=0.015, misses=0.3, exchanges=0.2, offset=0.02)}
+"""Usual errors, and those of small or blurred people."""
 
 
 def detected(rng: np.random.Generator, cameras: Sequence[Camera], times: Array, names: Sequence[str], joints: Array,

@@ -26,7 +26,7 @@ from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.camera.mask import half_size
 from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, warn
 from shadowpuppet.pipeline.rig import FrameSet, Rig, read_frames
-from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.pipeline.silhouettes import Silhouettes, segments_of
 from shadowpuppet.threads import child_environment, usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 
@@ -46,7 +46,7 @@ class Task:
 
     rig: Rig
     silhouettes: tuple[Silhouettes, ...]
-    """Of each camera."""
+    """Of each camera; empty if keypoints alone are evidence."""
     ready: bool = False
     """Whether ready silhouettes are read."""
     every: int = 1
@@ -61,15 +61,14 @@ class Task:
 
     def frames(self) -> Generator[FrameSet]:
         """The frame sets, made here."""
-        segment = [each.segmented for each in self.silhouettes]
-        with closing(read_frames(self.rig, segment, ready=self.ready, every=self.every)) as frames:
+        with closing(read_frames(self.rig, segments_of(self.rig, self.silhouettes), ready=self.ready, every=self.every)) as frames:
             for each in frames:
                 begin = time.perf_counter()
                 points = None if self.hull is None else self.hull.points(each.seen.masks)
                 images = each.images if self.images else (None,) * len(each.images)
                 corrected = tuple(None if image is None else half_size(image) for image in each.corrected) if self.corrected else ()
                 seen = each.seen
-                if self.codes and each.corrected:
+                if self.codes and any(image is not None for image in each.corrected):
                     seen = seen._replace(codes=tuple(map(colour_codes, each.corrected)))
                 yield each._replace(images=images, seen=seen, corrected=corrected, points=points, carving=time.perf_counter() - begin)
 

@@ -36,8 +36,8 @@ NEAR = 0.55
 LATE = 5
 """Number of sets without a frame of a camera after which the end of its film is reported: films rarely end with the same frame."""
 
-Segment = Callable[[CameraFrame], Segmented]
-"""Makes the silhouette of a camera's frame, as `Silhouettes.segmented` does."""
+Segment = Callable[[CameraFrame], Segmented | None]
+"""Makes the silhouette of a camera's frame, as `Silhouettes.segmented` does; None where silhouettes are no evidence."""
 
 Share = Callable[[Sequence[Segmented | None]], tuple[Mask | None, ...]]
 """Makes the masks (H, W) of a set's cameras of their silhouettes; None for a camera without a frame."""
@@ -46,6 +46,10 @@ Share = Callable[[Sequence[Segmented | None]], tuple[Mask | None, ...]]
 def unshared(found: Sequence[Segmented | None]) -> tuple[Mask | None, ...]:
     """Masks (H, W) as each camera has them."""
     return tuple(None if each is None else each.mask for each in found)
+
+
+def unsegmented(frame: CameraFrame) -> None:
+    """No silhouette: of films whose keypoints alone are evidence, or whose pictures alone are wanted."""
 
 
 def shown_in(found: Sequence[Segmented | None], share: Share = unshared, keypoints: tuple[Keypoints | None, ...] = ()) -> Seen:
@@ -175,7 +179,8 @@ def _single_frames(rig: Rig, segment: Segment, ready: bool, every: int) -> Gener
             return
         decoded = time.perf_counter()
         found = segment(frame)
-        seen = Seen((found.mask,), codes=(colour_codes(found.image),), keypoints=() if frame.keypoints is None else (frame.keypoints,))
+        seen = shown_in([found], keypoints=(frame.keypoints,))
+        seen = seen if found is None else seen._replace(codes=(colour_codes(found.image),))
         yield FrameSet(frame.time, (frame.image,), seen, decoded - start, time.perf_counter() - decoded)
 
 

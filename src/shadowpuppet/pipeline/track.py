@@ -17,7 +17,17 @@ from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
-from shadowpuppet.pipeline.prepare import MONOCULAR, MULTIVIEW, Kind, Prepared, check_options, fit_survey, look_around, run_writer
+from shadowpuppet.pipeline.prepare import (
+    MONOCULAR,
+    MULTIVIEW,
+    Kind,
+    Prepared,
+    check_options,
+    fit_survey,
+    is_for_rig,
+    look_around,
+    run_writer,
+)
 from shadowpuppet.pipeline.progress import Listener, StageTimer, Summary, generators, json_text, judge, set_aside, summary, timings, tracked
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
@@ -48,7 +58,7 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
     options = options or Options()
     rig = open_rig(recording, options)
     listener = listener or Listener()
-    if rig.is_multiview:
+    if is_for_rig(rig, options):
         return run(rig, MULTIVIEW, folder, options, listener, cache, resume)
     return run(rig, MONOCULAR, folder, options, listener, cache, resume)
 

@@ -101,8 +101,8 @@ def _of_overlay(film: Path, of: Evaluation, wanted: Mapping[int, str]) -> Iterat
     for n, frame in enumerate(open_frames(film)):
         if n in wanted:
             image, places = np.array(in_colour(frame.image)), _truth_at(of, n)
-            if len(cameras) <= 1:
-                high = cameras[0].size[1] if cameras else len(image) // 3
+            high = cameras[0].size[1] if cameras else len(image) // 3
+            if len(cameras) <= 1 and len(image) >= 3 * high:
                 rows = [_scaled(image[row * high :][:high], height=max(high, MIN_HEIGHT)) for row in range(3)]
                 if cameras and places is not None:
                     draw_bones(rows[2], cameras[0], places)

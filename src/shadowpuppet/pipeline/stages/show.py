@@ -17,15 +17,14 @@ from shadowpuppet.io.run_writer import RunWriter
 from shadowpuppet.motion.limbs import status_in_words
 from shadowpuppet.motion.motion import BLANK, Motion
 from shadowpuppet.pipeline.findings.look import Survey
-from shadowpuppet.pipeline.footage import CameraFrame
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.overlay_video import OUTLINED
 from shadowpuppet.pipeline.progress import FALLBACK_RATE, Listener
 from shadowpuppet.pipeline.rig import FrameSet, read_frames
 from shadowpuppet.pipeline.silhouette_cache import MaskStore
+from shadowpuppet.pipeline.silhouettes import segments_of
 from shadowpuppet.pipeline.subject import Before, Observation, State, TrackedSubject
-from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.video import Image, write_frames
 
 Drawing = tuple[Callable[[FrameSet], Image], str]
@@ -39,7 +38,7 @@ def show_run(writer: RunWriter, survey: Survey, options: Options, listener: List
     again."""
     if not options.overlay:
         return
-    legend = [*LEGEND, *(OUTLINED if survey.rig.is_multiview else MATCHED)]
+    legend = [*LEGEND, *(() if not survey.silhouettes else OUTLINED if survey.rig.is_multiview else MATCHED)]
     legend += CROSS if any(each.view.keypoints is not None for each in survey.rig.footage) else ()
     chosen, high = list(drawings), 0
     rate = (survey.look.rate if np.isfinite(survey.look.rate) else FALLBACK_RATE) / options.every
@@ -73,17 +72,13 @@ def drawings(subject: TrackedSubject[State, Observation, Before], motion: Motion
 def _pictured(survey: Survey, options: Options, store: MaskStore) -> Generator[FrameSet]:
     """The frame sets of a run, with pictures as the cameras would take them without their movement."""
     if store.sets:
-        with closing(read_frames(survey.rig, [_unsegmented] * len(survey.rig.footage), every=options.every)) as read:
+        with closing(read_frames(survey.rig, segments_of(survey.rig, ()), every=options.every)) as read:
             yield from (_steadied(survey, kept._replace(images=now.images)) for now, kept in zip(read, store))
     else:
         with closing(frames_beside(Task(survey.rig, survey.silhouettes, options.masks, options.every, corrected=False))) as made:
             yield from (_steadied(survey, now) for now in made)
 
 
-def _unsegmented(frame: CameraFrame) -> Segmented:
-    return Segmented(np.zeros(frame.image.shape[:2], bool))
-
-
 def _steadied(survey: Survey, now: FrameSet) -> FrameSet:
     images = (None if image is None else each.steadied(image) for each, image in zip(survey.silhouettes, now.images))
-    return now._replace(images=tuple(images))
+    return now._replace(images=tuple(images) or now.images)

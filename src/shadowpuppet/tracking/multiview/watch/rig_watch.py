@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 
 from shadowpuppet.camera.bits import Bits
@@ -27,7 +28,7 @@ class RigWatch:
             self._watch.aside.note(seconds, ["blind" if is_blind(mask) else "" for mask in masks])
             return seen
         kept = self._steps(seconds, self._watch(seconds, own or masks))
-        found = (None if of_own is None else each for of_own, each in zip(kept, seen.keypoints))
+        found = (None if aside else each for aside, each in zip(map(operator.is_not, kept, own or masks), seen.keypoints))
         return seen._replace(masks=tuple(None if of_own is None else mask for of_own, mask in zip(kept, masks, strict=True)),
                              keypoints=tuple(found))
 
