@@ -178,7 +178,7 @@ def test_bones_to_doubtful_landmarks_are_dashed():
 
 def test_a_dashed_bone_that_leads_far_away_takes_no_time():
     image = np.zeros((60, 80, 3), np.uint8)
-    drawing.draw_line(image, np.array([[40.0, 30.0], [1e9, 30.0]]), drawing.WHITE, 2, dashed=True)
+    drawing.draw_line(image, np.array([[40.0, 30.0], [1e9, 30.0]]), drawing.WHITE, 2, 9)
     assert image[30, 40:].any(1).all()
 
 

@@ -30,8 +30,8 @@ CROSS: Words = (("cross: keypoint", WHITE),)
 """Keypoints in words."""
 SHOWN = 0.5
 """Opacity of the model where the picture behind it is to be seen."""
-DASH = 9
-"""Length of the dashes and gaps of a doubtful limb's lines, in pictures 240 pixels high, pixels."""
+DASH = 4.5
+"""Length of the dashes and gaps of a doubtful limb's lines, over the lines' width."""
 MATCHING = np.array([BLACK, MODEL_ONLY, SILHOUETTE_ONLY, WHITE, (40, 40, 40), (40, 40, 40), GREY, GREY], np.uint8)
 """Colours of the matching row, indexed by model + 2 silhouette + 4 ignored."""
 MATCHED: Words = (("model only", MODEL_ONLY), ("silhouette only", SILHOUETTE_ONLY), ("both: white", WHITE),
@@ -100,7 +100,8 @@ def draw_model(image: Image, picture: Picture, pose: Array, doubtful: Container[
         is_doubtful = piece.part in doubtful
         for corners, colour in () if is_doubtful else piece.fills:
             cv2.fillConvexPoly(image, _fixed(corners), colour, cv2.LINE_AA, SUBPIXEL)
-        draw_line(image, piece.edge, colour_of(piece.part) if is_doubtful else (25, 25, 25), width + is_doubtful, is_doubtful)
+        colour, dash = (colour_of(piece.part), DASH * (width + 1)) if is_doubtful else ((25, 25, 25), 0)
+        draw_line(image, piece.edge, colour, width + is_doubtful, dash)
 
 
 def draw_skeleton(image: Image, picture: Picture, pose: Array, doubtful: Container[str] = ()) -> None:
@@ -114,23 +115,25 @@ def draw_skeleton(image: Image, picture: Picture, pose: Array, doubtful: Contain
     bones = [(visible[a], visible[b], b) for a, b in BONES if a in visible and b in visible]
     joints = {name for bone in BONES for name in bone}
     dots = [_point(visible[name]) for name in names if name in visible and name in joints]
-    unit = _unit(image)
+    metre = picture.camera.matrix[1, 1] / max(float(np.median(points[:, 2])), 1e-3)  # in pixels
+    unit = min(_unit(image), max(0.7, metre / 100))  # thin lines on people far off
     for extra, dark in ((2, True), (0, False)):  # a dark rim, so that bones stand out from any clothes
         for a, b, name in bones:
-            draw_line(image, np.array([a, b]), BLACK if dark else colour_of(name), round(2 * unit) + extra, name in doubtful)
+            width = round(2 * unit)
+            draw_line(image, np.array([a, b]), BLACK if dark else colour_of(name), width + extra, DASH * width * (name in doubtful))
     for radius, colour in ((3, BLACK), (2, WHITE)):
         for dot in dots:
             cv2.circle(image, dot, round(radius * unit) << SUBPIXEL, colour, -1, cv2.LINE_AA, SUBPIXEL)
 
 
-def draw_line(image: Image, points: Array, colour: Colour, width: int, dashed: bool = False) -> None:
-    """Draw the line through pixels (K, 2) into an image (H, W, 3)."""
+def draw_line(image: Image, points: Array, colour: Colour, width: int, dash: float = 0) -> None:
+    """Draw the line through pixels (K, 2) into an image (H, W, 3), in dashes of a length, pixels; 0: whole."""
     import cv2
 
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     parts = [points]
-    if dashed and along[-1] < 10 * image.shape[0]:  # else it is mostly far outside the picture
-        pieces = 2 * round(along[-1] / (2 * DASH * _unit(image))) + 1  # odd: a dash at both ends
+    if dash and along[-1] < 10 * image.shape[0]:  # else it is mostly far outside the picture
+        pieces = 2 * round(along[-1] / (2 * dash)) + 1  # odd: a dash at both ends
         starts, stops = np.linspace(0, along[-1], pieces + 1).reshape(-1, 2).T
         starts[1:] += width / 2  # a line ends in a round cap
         stops[:-1] = np.maximum(stops[:-1] - width / 2, starts[:-1])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.captions import WHITE, strip
-from shadowpuppet.camera.drawing import BLACK, colour_of, draw_line, in_colour
+from shadowpuppet.camera.drawing import BLACK, DASH, colour_of, draw_line, in_colour
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.geometry import Array
@@ -190,7 +190,8 @@ def draw_bones(image: Image, camera: Camera, places: JointTable, own: bool = Fal
         if len(ends) < 2 or not np.isfinite(ends).all():
             continue
         for ink, extra in ((BLACK, 2), (colour_of(b) if own else WHITE, 0)):
-            draw_line(image, np.array(ends), ink, max(1, round((4 if own else 1.6) * unit)) + extra, own and b in doubtful)
+            width = max(1, round((4 if own else 1.6) * unit))
+            draw_line(image, np.array(ends), ink, width + extra, DASH * width * (own and b in doubtful))
 
 
 def _pixels(image: Image, camera: Camera, places: JointTable) -> Array:
