@@ -23,7 +23,7 @@ LINE = 32
 
 def strip(width: int, texts: Iterable[Words], height: int = 0) -> Image:
     """A black strip (H, width, 3) with texts, each begun on a line of its own; H is even and `height` at least. A text that is longer than
-    the rest of its line stands on the next, or is broken at blanks, words longer than a line anywhere."""
+    the rest of its line stands on the next; what is longer than a line is broken at a blank, or else anywhere."""
     import cv2
 
     scale = max(SMALLEST, width / GROWTH)
@@ -49,16 +49,12 @@ def _lines(words: Words, most: int, wide: Callable[[str], int]) -> list[list[tup
     """Lines no wider than `most` pixels: the left end, pixels, text and colour of each piece."""
     lines, x = [list[tuple[int, str, Colour]]()], 0
     for text, colour in words:
-        fits = wide(text) <= most
-        for piece in [text] if fits else [part for word in text.split() for part in _cut(word, most, wide)]:
-            if x and x + wide(piece) > most:
+        while text:
+            if x and x + wide(text) > most:
                 lines, x = [*lines, []], 0
-            lines[-1].append((x, piece, colour))
-            x += wide(piece) + wide("nnn" if fits else "i")
+            fits = next((n for n in range(len(text), 1, -1) if x + wide(text[:n]) <= most), 1)
+            if fits < len(text) and (blank := text.rfind(" ", 1, fits + 1)) > 0:
+                fits = blank
+            lines[-1].append((x, text[:fits], colour))
+            x, text = x + wide(f"{text[:fits]}nnn"), text[fits:].lstrip()
     return lines
-
-
-def _cut(word: str, most: int, wide: Callable[[str], int]) -> list[str]:
-    """A word in pieces no wider than `most` pixels, or of one character."""
-    fits = next((n for n in range(len(word), 1, -1) if wide(word[:n]) <= most), 1)
-    return [word] if fits >= len(word) else [word[:fits], *_cut(word[fits:], most, wide)]

@@ -88,11 +88,10 @@ def _tile(image: Image, mask: Mask | None, people: Sequence[tuple[str, Picture, 
     import cv2
 
     image = in_colour(image).copy()
-    poses = [(number, picture, pose, found.limb_status) for number, picture, found in people
-             if np.isfinite(pose := np.asarray(found.pose, float)).all()]  # fmt: skip
-    for number, picture, pose, statuses in poses:
-        draw_person(image, picture, pose, doubtful_names(picture.body, statuses))
-        write_over(image, number, picture, pose)
+    for number, picture, found in people:
+        if np.isfinite(pose := np.asarray(found.pose, float)).all():
+            draw_person(image, picture, pose, doubtful_names(picture.body, found.limb_status))
+            write_over(image, number, picture, pose)
     if mask is not None:
         contours = cv2.findContours(mask.astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)[0]
         cv2.drawContours(image, contours, -1, SILHOUETTE_ONLY, max(1, round(image.shape[0] / 480)))
