@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.camera.mask import half_size
-from shadowpuppet.errors import ShadowPuppetError, warn
+from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, warn
 from shadowpuppet.pipeline.rig import FrameSet, Rig, read_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, segments_of
 from shadowpuppet.threads import child_environment, usable_cores
@@ -83,7 +83,7 @@ class _Message(NamedTuple):
     """What the process sends: a frame set, an error, or neither at the end."""
 
     seen: FrameSet | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Warning | str, ...] = ()
     error: Exception | None = None
 
 
@@ -112,7 +112,10 @@ def _received(packed: bytes) -> Generator[FrameSet]:
     try:
         while (message := _next(messages, thread)) is not None:
             for each in message.warnings:
-                warn(each)
+                if isinstance(each, ShadowPuppetWarning):
+                    warn(str(each))
+                else:
+                    warnings.warn(each, stacklevel=2)
             if message.error is not None:
                 raise message.error
             if message.seen is None:
@@ -198,8 +201,8 @@ def main() -> None:
             _write(made, _Message(warnings=_taken(caught), error=error))
 
 
-def _taken(caught: list[warnings.WarningMessage]) -> tuple[str, ...]:
-    """The texts of caught warnings, which are then forgotten."""
-    texts = tuple(str(each.message) for each in caught)
+def _taken(caught: list[warnings.WarningMessage]) -> tuple[Warning | str, ...]:
+    """Caught warnings, which are then forgotten."""
+    taken = tuple(each.message for each in caught)
     caught.clear()
-    return texts
+    return taken

@@ -103,7 +103,7 @@ def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: L
         raise TrackingError(f"{survey.look.recording}: nobody is found in the silhouettes of {survey.census.number} people")
     if len(found) < min(survey.census.number, options.people or survey.census.number):
         warn(f"{survey.look.recording}: {survey.census.number} people were counted, {len(found)} could be followed: a person whom few "
-             "cameras show whole, or who is seen for less than a second, is not")
+             f"cameras show whole, or who is seen for less than a second, is not; if there are no more, give --people {len(found)}")
     first = read_run(person_folder(writer.folder, min(found)))
     if len(found) == 1:
         ((number, metrics),) = found.items()
@@ -130,6 +130,7 @@ def _track(writer: RunWriter, prepared: Prepared[State, Observation, Before], ki
             frames = _segmented(stack, survey, options, watch, cache, kept)
             for found in rows.repeated(frames):
                 watch.tracked(subject.drawn(found))
+            began = time.perf_counter()
             observed = stack.enter_context(closing(subject.observations(frames)))
             for now, observation, seconds in timer.each("wait", observed):
                 timer.add(decode=now.decoding, segment=now.segmenting, hull=seconds)
