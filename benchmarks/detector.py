@@ -47,7 +47,8 @@ def detected(rng: np.random.Generator, cameras: Sequence[Camera], times: Array, 
     return [[Keypoints(tuple(names), xy[t][None], sure[t][None], nobody, "made") for xy, sure in seen] for t in range(T)]
 
 
-def _in_one(rng: np.random.Generator, camera: Camera, times: Array, names: Sequence[str], joints: Array, by: Detector) -> tuple[Array, Array]:
+def _in_one(rng: np.random.Generator, camera: Camera, times: Array, names: Sequence[str], joints: Array,
+            by: Detector) -> tuple[Array, Array]:
     """Pixels (T, K, 2) and confidences (T, K) of one camera."""
     T, K = joints.shape[:2]
     keep = np.exp(-np.median(np.diff(times)) / by.memory) if T > 1 else 0.0
