@@ -19,6 +19,7 @@ SETTINGS = {
     "silhouette.maintain": "the background no longer follows lasting changes: leave them out with --region, or take masks of another "
                            "program (shadowpuppet masks)",
     "multiview.forces.robust": "the bound of forces is rho: multiview.forces.rho = \"none\", \"linear\" or \"quadratic\"",
+    "multiview.gauss_newton.finalists": "with five cameras and more the best eight poses are refined to the end",
     "silhouette.method = knn": "found knn, which is gone; mog2 does the same as well, and auto better",
     **{f"like = humaneva_{motion}": f"humaneva_{motion} has moved: papers/ni2008/recordings.py in the source repository makes its spec"
        for motion in ("walking", "jogging", "boxing")},
@@ -29,7 +30,7 @@ BOUGUET = ("found a calibration of Bouguet's toolbox, which is not read any more
            "HumanEva becomes a recording by python -m papers.humaneva in the source repository")
 FILES = dict.fromkeys((".cal", ".m", ".mat"), BOUGUET)
 """By the ending of a calibration file."""
-IDLE: dict[str, object] = {"silhouette.maintain": False, "multiview.forces.robust": True}
+IDLE: dict[str, object] = {"silhouette.maintain": False, "multiview.forces.robust": True, "multiview.gauss_newton.finalists": 0.3}
 """By the name of a removed setting: the value that changed nothing. Files of earlier versions hold it, and it is left out."""
 
 

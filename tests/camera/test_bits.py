@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from shadowpuppet.camera.bits import count, grown_bits, is_set, pack, unpack, window_of_bits
-from shadowpuppet.camera.mask import bounding_window, grown
+from shadowpuppet.camera.bits import count, grown_bits, is_set, pack, unpack
+from shadowpuppet.camera.mask import grown
 from shadowpuppet.jit import kernel
 
 masks = arrays(bool, array_shapes(min_dims=2, max_dims=2, max_side=140))
@@ -68,12 +68,3 @@ def test_bits_grow_like_the_mask(mask, by):
     np.testing.assert_array_equal(unpack(found, mask.shape[1]), grown(mask, by))
     assert count(found) == grown(mask, by).sum()  # nothing beside the picture
     np.testing.assert_array_equal(before, pack(mask))
-
-
-@given(specks(), st.integers(0, 30))
-def test_the_window_of_bits_is_that_of_the_mask(mask, margin):
-    found = window_of_bits(pack(mask), margin)
-    if mask.any():
-        assert found == bounding_window(mask, margin)
-    else:
-        assert mask[found].size == 0

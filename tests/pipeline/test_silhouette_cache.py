@@ -16,7 +16,7 @@ from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.prepare import MULTIVIEW
-from shadowpuppet.pipeline.rig import FrameSet, open_rig
+from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
 from shadowpuppet.pipeline.track import Listener, run, track_recording
 
@@ -103,17 +103,6 @@ def test_a_store_gives_back_what_it_got(rng, shape):
     assert 0 < store.size < 8 * (-(-shape[0] * shape[1] // 8) + 20)
     assert all(each.seen.masks[1] is None and each.images == (None,) * 3 for each in store)
     np.testing.assert_array_equal([[each.seen.masks[0], each.seen.masks[2]] for each in store], masks)
-
-
-def test_a_store_keeps_what_cameras_had_before_others_added_to_it(rng):
-    store, (masks, own) = MaskStore(), rng.random((2, 3, 6, 7)) < 0.5
-    given = [FrameSet(0.0, (None,) * 3, Seen(tuple(masks), own=(*own[:2], None))), FrameSet(0.1, (None,) * 3, Seen(tuple(masks)))]
-    assert list(store.stored(given)) == given
-    one, other = store
-    np.testing.assert_array_equal(one.seen.masks, masks)
-    np.testing.assert_array_equal(one.seen.own[:2], own[:2])
-    assert one.seen.own[2] is None
-    assert other.seen.own == ()
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (120, 160), (480, 640)])

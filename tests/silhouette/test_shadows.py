@@ -57,8 +57,7 @@ def test_an_even_shadow_on_the_wall_beside_a_person_is_not(rng, light):
     assert overlap(seen(rng, picture, wall), trunk | head) > 0.95
 
 
-def test_what_is_taken_for_shadow_is_known_and_may_be_given_back(rng):
-    """By other cameras, to whom it is a part of the person."""
+def test_what_is_taken_for_shadow_is_known(rng):
     wall = scene(rng, SKIN_WALL)
     trunk, head = trunk_and_head()
     picture = wall.copy()
@@ -69,8 +68,6 @@ def test_what_is_taken_for_shadow_is_known_and_may_be_given_back(rng):
     assert overlap(found.mask, trunk) > 0.95
     assert np.count_nonzero(found.shadow & head) > 0.9 * np.count_nonzero(head)
     assert not (found.shadow & found.mask).any()
-    assert overlap(found.with_limbs(found.shadow & head), trunk | head) > 0.95
-    np.testing.assert_array_equal(found.with_limbs(np.zeros(SIZE, bool)), found.mask)
 
 
 @pytest.mark.parametrize("method", ["colour", "averaging", "mog2"])
@@ -78,7 +75,6 @@ def test_a_method_that_tells_no_shadows_has_none(rng, method):
     segmenter = learn_background(empty_shots(rng, scene(rng, SKIN_WALL)), SilhouetteSettings(method=method))
     found = segmenter.segmented(segmenter.labelled(shot(rng, scene(rng, SKIN_WALL))))
     assert found.shadow is None
-    assert found.with_limbs is None
 
 
 def test_a_soft_shadow_that_the_person_stands_in_is_not(rng):

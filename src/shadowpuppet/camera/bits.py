@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shadowpuppet.camera.mask import Window
 from shadowpuppet.jit import device, kernel
 
 Bits = NDArray[np.uint64]
@@ -37,17 +36,6 @@ def grown_bits(bits: Bits, by: int, width: int) -> Bits:
     out = bits.copy()
     _grow(out, by, width, np.empty_like(bits))
     return out
-
-
-def window_of_bits(bits: Bits, margin: int) -> Window:
-    """Bounding box of the set pixels of bits (C, H), with a margin (pixels); empty without a set pixel."""
-    words = np.bitwise_or.reduce(bits, axis=1).tolist()
-    columns = sum(word << 64 * n for n, word in enumerate(words))
-    if not columns:
-        return slice(0, 0), slice(0, 0)
-    rows = np.flatnonzero(np.bitwise_or.reduce(bits, axis=0))
-    first, last = (columns & -columns).bit_length() - 1, columns.bit_length()
-    return slice(max(int(rows[0]) - margin, 0), int(rows[-1]) + 1 + margin), slice(max(first - margin, 0), last + margin)
 
 
 @device

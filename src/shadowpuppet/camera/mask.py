@@ -29,8 +29,6 @@ class Seen(NamedTuple):
     """Pixels (H / 2, W / 2) that were taken for shadow; empty: not known."""
     codes: tuple[ColourCode | None, ...] = ()
     """Coarse colours (`camera.colour_codes`) in the light of the empty scene; empty: not known."""
-    own: tuple[Mask | None, ...] = ()
-    """Silhouettes (H, W) as each camera's own picture has them; empty where other cameras have added nothing to `masks`."""
     keypoints: tuple[Keypoints | None, ...] = ()
     """What a detector found, in pixels of these pictures; empty: without one."""
 

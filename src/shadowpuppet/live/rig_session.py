@@ -31,7 +31,6 @@ from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.subject import TrackedSubject, average_body
 from shadowpuppet.tracking.doubt.multiview import Before
 from shadowpuppet.tracking.frozen import LEAST
-from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 from shadowpuppet.tracking.multiview.tracker import MultiviewState
 from shadowpuppet.tracking.multiview.watch.rig_watch import RigWatch
 from shadowpuppet.video import Image
@@ -71,7 +70,6 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
         body = average_body(self.options.multiview.body)
         self._pictures = [Picture(body, camera, camera.T_camera_world) for camera in self._worked]
         self._segment: list[Segment] = []
-        self._share = SharedShadows(self._worked)
         self._without = dict[int, str]()
         """Cameras whose pictures cannot be used now, by index, and why."""
         self._found_again: Callable[[], list[LearntRoom] | None] | None = None
@@ -242,7 +240,7 @@ class RigSession(LiveSession[SnapshotSet, MultiviewState, HullObservation, Befor
         found = [None if image is None else segment(CameraFrame(shot.captured, image, None))
                  for segment, image in zip(self._segment, images)]
         codes = tuple(None if each is None else colour_codes(each.image) for each in found)
-        return shown_in(found, self._share)._replace(codes=codes)
+        return shown_in(found)._replace(codes=codes)
 
     def _forget_time(self) -> None:
         self._watch = None if self._watch is None else RigWatch(len(self.full))

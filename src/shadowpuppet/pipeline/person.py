@@ -35,7 +35,6 @@ from shadowpuppet.tracking.arm_colours import ColourCounts
 from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.tracking.doubt.monocular import Before, MonocularDoubt
-from shadowpuppet.tracking.doubt.steps import Trail
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
@@ -94,7 +93,7 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
     tracker: MonocularTracker
     colours: ColourCounts | None = None
     """What is known of the arms' colours before the first frame."""
-    state_types = (State, Particles, Unexplained, Before, Trail, ColourCounts)
+    state_types = (State, Particles, Unexplained, Before, ColourCounts)
 
     @classmethod
     def of(cls, fit: SizeFit, camera: Camera, settings: MonocularSettings, source: str, rate: float) -> MonocularSubject:

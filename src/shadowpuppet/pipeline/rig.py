@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import operator
 import time
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.camera.keypoints import Keypoints
-from shadowpuppet.camera.mask import Mask, Seen, half_size
+from shadowpuppet.camera.mask import Seen, half_size
 from shadowpuppet.errors import SettingsError, SilhouetteError, VideoError, warn
 from shadowpuppet.io.inputs.inputs import NO_INPUTS, Inputs, inputs_of
 from shadowpuppet.io.recording import Recording
@@ -39,25 +38,16 @@ LATE = 5
 Segment = Callable[[CameraFrame], Segmented | None]
 """Makes the silhouette of a camera's frame, as `Silhouettes.segmented` does; None where silhouettes are no evidence."""
 
-Share = Callable[[Sequence[Segmented | None]], tuple[Mask | None, ...]]
-"""Makes the masks (H, W) of a set's cameras of their silhouettes; None for a camera without a frame."""
-
-
-def unshared(found: Sequence[Segmented | None]) -> tuple[Mask | None, ...]:
-    """Masks (H, W) as each camera has them."""
-    return tuple(None if each is None else each.mask for each in found)
-
 
 def unsegmented(frame: CameraFrame) -> None:
     """No silhouette: of films whose keypoints alone are evidence, or whose pictures alone are wanted."""
 
 
-def shown_in(found: Sequence[Segmented | None], share: Share = unshared, keypoints: tuple[Keypoints | None, ...] = ()) -> Seen:
-    """What the silhouettes of a set's cameras show, with those masks that `share` makes of them, and the keypoints found in its frames."""
-    own, masks = unshared(found), share(found)
+def shown_in(found: Sequence[Segmented | None], keypoints: tuple[Keypoints | None, ...] = ()) -> Seen:
+    """What the silhouettes of a set's cameras show, and the keypoints found in its frames."""
+    masks = tuple(None if each is None else each.mask for each in found)
     shadows = tuple(None if each is None or each.shadow is None else half_size(each.shadow) for each in found)
-    return Seen(masks, shadows, own=() if all(map(operator.is_, own, masks)) else own,
-                keypoints=keypoints if any(each is not None for each in keypoints) else ())
+    return Seen(masks, shadows, keypoints=keypoints if any(each is not None for each in keypoints) else ())
 
 
 class FrameSet(NamedTuple):
@@ -163,12 +153,9 @@ def open_rig(path: str | Path, options: Options) -> Rig:
 
 
 def read_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = False, every: int = 1) -> Generator[FrameSet]:
-    """Every `every`-th frame set with its silhouettes; frames of several cameras are aligned by `synchronized_frames`, and what one of them
-    takes for shadow is looked at by the others."""
+    """Every `every`-th frame set with its silhouettes; frames of several cameras are aligned by `synchronized_frames`."""
     if rig.is_multiview:
-        from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
-
-        return synchronized_frames(rig, segment, ready=ready, every=every, share=SharedShadows(rig.cameras))
+        return synchronized_frames(rig, segment, ready=ready, every=every)
     return _single_frames(rig, segment[0], ready, every)
 
 
@@ -187,7 +174,7 @@ def _single_frames(rig: Rig, segment: Segment, ready: bool, every: int) -> Gener
 
 
 def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = False, every: int = 1,
-                        threads: int | None = None, share: Share = unshared) -> Generator[FrameSet]:
+                        threads: int | None = None) -> Generator[FrameSet]:
     """Synchronized frame sets of all cameras with their silhouettes.
 
     Each set contains each camera's frame nearest to its time, within about half the sets' interval (`NEAR`). A camera is missing from the
@@ -199,7 +186,6 @@ def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = F
         every: segment and return only every `every`-th set.
         threads: number of threads that make the next set while the last one is used; by default one less than the processor's cores. The
             sets do not depend on it.
-        share: makes the masks of a set of what is segmented in each of its pictures.
     """
     readers = [CameraReader(footage, one, ready) for footage, one in zip(rig.footage, segment)]
     leaders, step = rig.leaders, 1 / rig.rate
@@ -216,12 +202,10 @@ def synchronized_frames(rig: Rig, segment: Sequence[Segment], *, ready: bool = F
             work = _begin(pool, readers, leaders, step, moment, wanted=n % every == 0)
             if n % every != 1 % every:
                 continue
-            start = time.perf_counter()
             found = [part.segmented for part in parts]
-            seen = shown_in(found, share, tuple(part.keypoints for part in parts))
-            sharing = time.perf_counter() - start
+            seen = shown_in(found, tuple(part.keypoints for part in parts))
             yield FrameSet(moment, tuple(part.image for part in parts), seen,
-                           sum(part.decoding for part in parts), sum(part.segmenting for part in parts) + sharing,
+                           sum(part.decoding for part in parts), sum(part.segmenting for part in parts),
                            tuple(None if each is None else each.image for each in found))
 
 

@@ -46,21 +46,19 @@ class MaskStore:
     """Size of the stored masks, bytes."""
     complete: bool = False
     """Whether all frame sets of the recording are stored."""
-    sets: list[tuple[float, list[Packed | None], list[Packed | None], list[bytes | None], tuple[Keypoints | None, ...]]] = field(
-        default_factory=list)
-    """For each set its time (s) and, for each camera, `Seen.masks`, `Seen.own`, where the mask is, `Seen.codes`, and `Seen.keypoints`; None
-    for a camera without them."""
+    sets: list[tuple[float, list[Packed | None], list[bytes | None], tuple[Keypoints | None, ...]]] = field(default_factory=list)
+    """For each set its time (s) and, for each camera, `Seen.masks`, where the mask is, `Seen.codes`, and `Seen.keypoints`; None for a
+    camera without them."""
 
     def add(self, time: float, seen: Seen) -> None:
         """Store one frame set's masks, and the colours in them; not the shadows."""
         if self.size > self.limit:
             self.sets.clear()
             return
-        packed, alone = ([None if mask is None else (_compressed(np.packbits(mask)), mask.shape) for mask in each]
-                         for each in (seen.masks, seen.own))
+        packed = [None if mask is None else (_compressed(np.packbits(mask)), mask.shape) for mask in seen.masks]
         colours = [None if mask is None or each is None else _compressed(each[thinned(mask)]) for mask, each in zip(seen.masks, seen.codes)]
-        self.sets.append((time, packed, alone, colours, seen.keypoints))
-        self.size += sum(len(one[0]) for one in (*packed, *alone) if one is not None)
+        self.sets.append((time, packed, colours, seen.keypoints))
+        self.size += sum(len(one[0]) for one in packed if one is not None)
         self.size += sum(len(one) for one in colours if one is not None)
         self.size += sum(each.xy.nbytes + each.confidence.nbytes for each in seen.keypoints if each is not None)
 
@@ -73,9 +71,9 @@ class MaskStore:
         yield from map(self._frame_set, reversed(range(len(self.sets))))
 
     def _frame_set(self, n: int) -> FrameSet:
-        time, packed, alone, colours, keypoints = self.sets[n]
+        time, packed, colours, keypoints = self.sets[n]
         masks = tuple(map(_unpacked, packed))
-        seen = Seen(masks, codes=tuple(map(_codes, masks, colours)), own=tuple(map(_unpacked, alone)), keypoints=keypoints)
+        seen = Seen(masks, codes=tuple(map(_codes, masks, colours)), keypoints=keypoints)
         return FrameSet(time, (None,) * len(packed), seen)
 
     def stored(self, frames: Iterable[FrameSet]) -> Generator[FrameSet]:

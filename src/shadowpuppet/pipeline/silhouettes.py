@@ -91,9 +91,7 @@ class Silhouettes:
 
     def _kept(self, found: Segmented) -> Segmented:
         """A silhouette within the region."""
-        again = found.with_limbs
-        return Segmented(self._within(found.mask), found.shadow, None if again is None else lambda limbs: self._within(again(limbs)),
-                         found.image)
+        return found._replace(mask=self._within(found.mask))
 
     def _within(self, mask: Mask) -> Mask:
         if self.region is None:

@@ -71,11 +71,6 @@ def at_half_contrast(mask: Labels, contrast: Callable[[Labels], Contrast], outli
     return np.asarray(cv2.medianBlur(found, 3), np.uint8) | full
 
 
-def outline_reach(outline: EdgeProfile) -> int:
-    """Distance (pixels) from a changed pixel of a mask, to the sides, up to which `at_half_contrast` may differ."""
-    return 2 * outline.width + SURROUND_MARGIN + 1
-
-
 def outline_width(people: Iterable[tuple[Labels, Contrast]]) -> int:
     """Width of the blur of outlines, pixels, from masks that reach too far out and the contrast in them.
 

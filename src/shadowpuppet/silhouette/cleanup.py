@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.mask import Window, bounding_window
-from shadowpuppet.silhouette.boundary import OUTWARD_REACH, Contrast, EdgeProfile, Labels, at_half_contrast, disc, outline_reach
+from shadowpuppet.silhouette.boundary import OUTWARD_REACH, Contrast, EdgeProfile, Labels, at_half_contrast, disc
 
 MIN_PART_SHARE = 0.02
 """Least size of another part of the person (a hand), or of another person, over the largest part's: a person five times as far away as two
@@ -20,40 +19,17 @@ MAX_HOLE_SHARE = 0.004
 """Holes of up to this share of the person's area are filled."""
 
 
-class Cleaned(NamedTuple):
-    """A cleaned-up frame."""
-
-    person: Labels
-    """1 for the person, or people, (H, W); empty if there is none."""
-    coarse: Labels
-    """The same (H, W) before the outline was placed."""
-    outlined: Labels
-    """The same (H, W) before parts were left out, and holes filled, once more."""
-
-
-def clean(label: Labels, contrast: Callable[[Window, Labels], Contrast], outline: EdgeProfile, several: bool = False,
-          like: Cleaned | None = None) -> Cleaned:
-    """The person among pixels (H, W) labelled 0, 1 or 2 (background, perhaps, surely), or `several` people.
-
-    contrast: of pixels (h, w) of a window of rows and columns. like: the same of labels that differ in few places, which saves time: the
-    outline is placed again around these alone.
-    """
+def clean(label: Labels, contrast: Callable[[Window, Labels], Contrast], outline: EdgeProfile, several: bool = False) -> Labels:
+    """The person among pixels (H, W) labelled 0, 1 or 2 (background, perhaps, surely), or `several` people: 1 for theirs; empty if there is
+    none. `contrast`: of pixels (h, w) of a window of rows and columns."""
     mask = coarse_person(label, several)
-    if like is None:
-        outlined, margin = np.zeros_like(mask), outline.width + OUTWARD_REACH + 1
-        window = inner = bounding_window(mask, margin)
-    else:
-        outlined, reach = like.outlined.copy(), outline_reach(outline)
-        inner, window = (bounding_window(mask ^ like.coarse, margin) for margin in (reach, 2 * reach))
-    outlined[inner] = 0
+    outlined, window = np.zeros_like(mask), bounding_window(mask, outline.width + OUTWARD_REACH + 1)
     if mask[window].any():
-        within = tuple(slice(part.start - wide.start, part.stop - wide.start) for part, wide in zip(inner, window))
-        found = at_half_contrast(np.ascontiguousarray(mask[window]), lambda where: contrast(window, where), outline)
-        outlined[inner] = found[within]
+        outlined[window] = at_half_contrast(np.ascontiguousarray(mask[window]), lambda where: contrast(window, where), outline)
     around, person = bounding_window(outlined, 1), np.zeros_like(mask)
     if outlined[around].any():
         person[around] = fill_small_holes(main_part(outlined[around], outlined[around] > 0, several))
-    return Cleaned(person, mask, outlined)
+    return person
 
 
 def coarse_person(label: Labels, several: bool = False) -> Labels:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -14,7 +13,7 @@ from shadowpuppet.camera.mask import Window
 from shadowpuppet.silhouette.background import Background, Image, check_alike, check_image, to_planes
 from shadowpuppet.silhouette.boundary import Contrast, EdgeProfile, Labels
 from shadowpuppet.silhouette.classifiers import METHODS, AveragingClassifier, ChannelClassifier, Classifier
-from shadowpuppet.silhouette.cleanup import Cleaned, clean
+from shadowpuppet.silhouette.cleanup import clean
 from shadowpuppet.silhouette.correction.frame_correction import Correction
 from shadowpuppet.silhouette.correction.registration import Gap
 from shadowpuppet.silhouette.settings import SilhouetteSettings
@@ -34,14 +33,12 @@ class Labelled(NamedTuple):
 
 
 class Segmented(NamedTuple):
-    """A frame's silhouette, and what it would be if limbs had been taken for shadow."""
+    """A frame's silhouette, and what was taken for shadow."""
 
     mask: NDArray[np.bool_]
     """The person (H, W)."""
     shadow: NDArray[np.bool_] | None = None
     """As in `Labelled`."""
-    with_limbs: Callable[[NDArray[np.bool_]], NDArray[np.bool_]] | None = None
-    """From pixels (H, W) of `shadow` that are the person's to the mask (H, W) with them; None without `shadow`."""
     image: Image | None = None
     """The frame (H, W, 3) or (H, W) as it would be where, and in the light in which, the camera saw the empty scene; None: not known."""
 
@@ -61,8 +58,6 @@ class Segmenter:
        `averaging` and `mog2` have comparisons of their own.
     4. Clean up (`cleanup.clean`, if the setting `clean` asks for it): remove specks, keep the largest part and what nearly touches it,
        move the outline to half the contrast of the unsmoothed frame (`boundary.at_half_contrast`), fill small holes.
-
-    Several cameras then decide together on what each of them took for shadow (`tracking.multiview.surface.shared_shadows`).
 
     The noise that step 3 assumes is set once, by `learning.assumed_sigma`: the greatest of the empty scene's, the film's own
     (`background.film_noise`, after step 2) and the setting `noise_floor`, plus a share of the background's edges.
@@ -98,15 +93,7 @@ class Segmenter:
 
     def segmented(self, labelled: Labelled) -> Segmented:
         """The silhouette that step 4 makes of a frame after step 3."""
-        def with_limbs(limbs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-            label = np.where(limbs, np.maximum(labelled.label, 1), labelled.label)
-            return mask | self._filled(self._cleaned(labelled._replace(label=label), cleaned).person, labelled.gap)
-
-        cleaned = self._cleaned(labelled)
-        mask = self._filled(cleaned.person, labelled.gap)
-        if labelled.shadow is None:
-            return Segmented(mask, image=labelled.image)
-        return Segmented(mask, labelled.shadow, with_limbs, labelled.image)
+        return Segmented(self.finished(labelled), labelled.shadow, labelled.image)
 
     def labelled(self, image: Image) -> Labelled:
         """A frame's pixels after step 3. Raises `SilhouetteError` for a frame that does not fit the background."""
@@ -124,14 +111,13 @@ class Segmenter:
 
     def finished(self, labelled: Labelled) -> NDArray[np.bool_]:
         """The mask (H, W) that step 4 makes of it."""
-        return self._filled(self._cleaned(labelled).person, labelled.gap)
+        return self._filled(self._cleaned(labelled), labelled.gap)
 
-    def _cleaned(self, labelled: Labelled, like: Cleaned | None = None) -> Cleaned:
-        """The cleaned-up frame; as it is if it is not to be cleaned up. `like`: see `clean`."""
-        label = labelled.label
+    def _cleaned(self, labelled: Labelled) -> Labels:
+        """The person (H, W) in the cleaned-up frame; as labelled if it is not to be cleaned up."""
         if not self.settings.cleaned:
-            return Cleaned(label, label, label)
-        return clean(label, partial(self.contrast, labelled.image), self.edge, self.several, like)
+            return labelled.label
+        return clean(labelled.label, partial(self.contrast, labelled.image), self.edge, self.several)
 
     def _filled(self, person: Labels, gap: Gap | None) -> NDArray[np.bool_]:
         """The mask (H, W) of a person (H, W), with pixels that the person always covers, or that a moved camera does not show."""

@@ -42,8 +42,6 @@ RARE = 1e-5
 """Added to every colour's frequency: one that is hardly seen says nothing."""
 NEIGHBOURS = 0.2
 """Share of a colour's pixels that each neighbour gets, along each channel, as noise and shading change a colour a little."""
-MOST_MISMATCH = 2.0
-"""Bound of the pixels that do not match an arm, over the arm's."""
 ABOUT_HEAD, ABOUT_ARMS, EDGE = 4, 3, 1
 """Bodies do not fit to the pixel: within the first distance (pixels at 320 x 240) of the head, whose skin may have the hands' colour, no
 pixel counts; within the others, of the arms and of other parts' edges, no colour is learnt."""
@@ -99,7 +97,7 @@ class ArmColours:
 
     def mismatch(self, seen: PartObservation, pose: Array) -> dict[str, float]:
         """Of each arm in a pose (D,), the pixels of its parts that have other colours, and those of the arms' colours that neither arm
-        covers, over the first's number, at most `MOST_MISMATCH`; without arms whose parts do not count."""
+        covers, over the first's number, at most 1; without arms whose parts do not count."""
         counted, parts = ~seen.observation.ignore, self.picture.body.parts
         which = {side: np.flatnonzero([part in seen.parts and part.startswith(side) for part in parts]) for side in SIDES}
         drawn = {f"{side}_arm": self.picture.draw(pose, own) & counted for side, own in which.items()}
@@ -107,7 +105,7 @@ class ArmColours:
         found = seen.observation.silhouette & counted
         over = count(found & ~(left | right))
         areas = {arm: count(own) for arm, own in drawn.items()}
-        return {arm: min((count(own & ~found) + over) / areas[arm], MOST_MISMATCH) for arm, own in drawn.items() if areas[arm]}
+        return {arm: min((count(own & ~found) + over) / areas[arm], 1.0) for arm, own in drawn.items() if areas[arm]}
 
     def drawn(self, pose: Array, kind: str) -> Mask:
         """The parts of a kind in a pose (D,), as a mask (H, W)."""

@@ -17,7 +17,7 @@ person who stands still changes some five times as much."""
 MOVES = 1e-2
 """Share of another camera's silhouette that must differ for the person to have moved."""
 LEAST = 2
-"""Number of cameras that are never set aside as frozen."""
+"""Number of cameras that are never set aside."""
 
 
 def same_silhouette(one: Mask, other: Mask, share: float = SAME) -> bool:

@@ -8,10 +8,8 @@ import numpy as np
 import people
 import pytest
 
-from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.tracking.doubt.mirror import TOGETHER_ALLOWED, Mirrors, _weights
-from shadowpuppet.tracking.doubt.monocular import Chains, MonocularDoubt
+from shadowpuppet.tracking.doubt.mirror import Mirrors, _weights
+from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
 from shadowpuppet.tracking.doubt.variance import variance_model
 from shadowpuppet.tracking.monocular.settings import make_settings
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
@@ -139,35 +137,6 @@ def test_an_arm_in_the_plane_of_the_picture_has_no_other_place():
     assert all(mode.weight < 0.5 for mode in doubt(flat)[0].modes)
 
 
-def test_arms_held_out_from_a_twisted_trunk_may_be_as_far_before_as_behind():
-    """One straight line from hand to hand looks the same turned to the left and to the right."""
-    twisted = pose(torso_twist=0.4, left_shoulder_abduction=1.5, right_shoulder_abduction=1.5)
-    picture = people.picture()
-    points, mask = picture.points(twisted[None])[0], picture.mask(twisted)
-    seen = MIRRORS.together(twisted, points, Observation.of(mask))
-    assert seen.points.shape == (1, 2, len(NAMES), 3)
-    moved = (seen.points[0, seen.more[0].argmin()] - points)[[LEFT_HAND, RIGHT_HAND]]
-    assert np.sign(moved[:, 2]).tolist() == np.sign(points[[RIGHT_HAND, LEFT_HAND], 2] - points[[LEFT_HAND, RIGHT_HAND], 2]).tolist()
-    assert (np.abs(moved[:, 2]) > 0.15).all()
-    assert (np.abs(moved[:, :2]) < 0.15).all()
-    assert seen.more.min() < 0.3 * mask.sum()
-    far = seen.displacements(points, TOGETHER_ALLOWED)
-    assert far[LEFT_HAND, 2] > 0.3 > far[LEFT_HAND, :2].max()
-    assert far[NAMES.index("pelvis")].max() < 0.05
-    found = dict(MonocularDoubt(tracker()).evidence(state(twisted, mask), mask, 0.0, None)[0].components)
-    with_it, without = (variance_model("monocular").sd(NAMES, {**found, "together": each}) for each in (far, 0 * far))
-    assert with_it[LEFT_HAND, 2] > 1.1 * without[LEFT_HAND, 2]
-
-
-def test_a_body_whose_trunk_does_not_twist_has_no_images_of_trunk_and_arms():
-    whole = Picture(make_body("anatomical", average_sizes("anatomical", 1.75)), people.camera(), people.picture().T_camera_base)
-    at = np.zeros(len(whole.body.skeleton.dofs))
-    points = whole.points(at[None])[0]
-    seen = Mirrors(whole).together(at, points, Observation.of(whole.mask(at)))
-    assert seen.points.shape == (0, 2, *points.shape)
-    assert not seen.displacements(points).any()
-
-
 def test_images_that_differ_from_no_other_place_are_no_modes_and_cheaper_ones_weigh_more():
     ends, same = np.zeros((2, 3)), np.zeros(3)
     far, near, other = (np.full((2, 3), x) for x in (0.2, 0.19, -0.2))
@@ -178,15 +147,6 @@ def test_images_that_differ_from_no_other_place_are_no_modes_and_cheaper_ones_we
     assert list(found) == [1, 2]
     assert found[1] > found[2] > 0.15
     assert not _weights(ends, np.array([far] * 3), np.full(3, 1e6))
-
-
-def test_the_mirror_image_of_a_bone_is_as_far_before_as_it_is_behind():
-    names = ("left_shoulder", "left_elbow", "left_wrist", "right_shoulder")
-    points = np.array([[0, 0, 3.0], [0.1, 0, 2.8], [0.1, 0.2, 2.8], [0.3, 0, 3.0]])
-    found = Chains.of(names).mirrored(points)
-    assert found[0] == found[3] == 0
-    assert found[1] == pytest.approx(2 * 0.2, abs=0.03)
-    assert found[2] >= found[1]
 
 
 def test_the_spread_is_that_of_the_particles_where_they_are_equally_good():

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import rendered
 
-from shadowpuppet.tracking.multiview.seen_stature import extents, scaled, seen_stature
+from shadowpuppet.tracking.multiview.height_estimation import extents
+from shadowpuppet.tracking.multiview.seen_stature import scaled, seen_stature
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
 

@@ -12,10 +12,9 @@ from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.pipeline.findings.look import FirstSeconds
 from shadowpuppet.pipeline.footage import CameraFrame, Opening, Sample
-from shadowpuppet.pipeline.rig import Rig, shown_in, synchronized_frames, unshared
+from shadowpuppet.pipeline.rig import Rig, shown_in, synchronized_frames
 from shadowpuppet.pipeline.silhouettes import Silhouettes, segments_of
 from shadowpuppet.threads import MadeOnDemand, usable_cores
-from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 
 OPENING, OPENED = 2.0, 40
 """Length (s) of the beginning in which the person is measured, and the greatest number of frame sets kept of it."""
@@ -51,10 +50,10 @@ def kept_sets(rig: Rig, samples: Sequence[Sample], opening: Opening) -> list[tup
 
 
 def _segmented(rig: Rig, silhouettes: Sequence[Silhouettes], sets: Sequence[tuple[CameraFrame, ...]]) -> FirstSeconds:
-    share, number = SharedShadows(rig.cameras), len(sets)
+    number = len(sets)
 
     def seen(n: int) -> Seen:
-        return shown_in([each.segmented(frame) for each, frame in zip(silhouettes, sets[n], strict=True)], share)
+        return shown_in([each.segmented(frame) for each, frame in zip(silhouettes, sets[n], strict=True)])
 
     found = MadeOnDemand(seen, number)
     return FirstSeconds([frames[rig.leaders[0]].time for frames in sets], MadeOnDemand(lambda n: found[n].masks, number),
@@ -66,8 +65,7 @@ def read_sets(rig: Rig, silhouettes: Sequence[Silhouettes], opening: Opening, re
     """As `first_seconds`, of films that are read; `silhouettes`: empty without."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when the run comes to it
-        frames = synchronized_frames(rig, segments_of(rig, silhouettes), ready=ready, every=opening.every,
-                                     threads=usable_cores(), share=SharedShadows(rig.cameras) if silhouettes else unshared)
+        frames = synchronized_frames(rig, segments_of(rig, silhouettes), ready=ready, every=opening.every, threads=usable_cores())
         sets = [(each.time, each.seen) for each in islice(frames, opening.number)]
     sets = [each for each in sets if each[0] <= rig.recording.begin + opening.seconds] or sets[:1]
     return FirstSeconds([time for time, _ in sets], [seen.masks for _, seen in sets], shadows=[seen.shadows for _, seen in sets],

@@ -32,7 +32,6 @@ from shadowpuppet.pipeline.people.census import Census, are_apart, later_sets, s
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.threads import one_opencv_thread
-from shadowpuppet.tracking.multiview.surface.shared_shadows import SharedShadows
 from shadowpuppet.tracking.people.views import View, views_of
 
 SILHOUETTES_OR_CAMERAS = "silhouettes do not fit together: film the empty scene, or calibrate"
@@ -62,8 +61,7 @@ def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, fil
     if any(_shows_person(film) for film in films):
         steps("counting people in all films")
         seen = max((film.sample.times[-1] for film in films if len(film.sample.times)), default=0.0)
-        share = SharedShadows(rig.cameras)
-        sampled, later = sampled_sets([film.sample for film in films], wide, share), later_sets(rig, wide, float(seen), share)
+        sampled, later = sampled_sets([film.sample for film in films], wide), later_sets(rig, wide, float(seen))
         census, spread = take_census(rig.cameras, sampled, later), [*sampled, *later]
     counted = census.number if census is not None else 0
     if census is not None and options.people is not None and not (options.people == 1 < counted and are_apart(spread)):

@@ -17,8 +17,8 @@ from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.threads import one_blas_thread
-from shadowpuppet.tracking.multiview.height_estimation import DEVIATION
-from shadowpuppet.tracking.multiview.seen_stature import extents, hull_points, seen_stature
+from shadowpuppet.tracking.multiview.height_estimation import DEVIATION, extents
+from shadowpuppet.tracking.multiview.seen_stature import hull_points, seen_stature
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.size_estimation import STATURE_DEVIATION
 

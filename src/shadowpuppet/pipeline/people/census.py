@@ -13,11 +13,12 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample
-from shadowpuppet.pipeline.rig import Rig, Share, shown_in, unshared
+from shadowpuppet.pipeline.rig import Rig, shown_in
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.silhouette.segmenter import Segmented
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
+from shadowpuppet.tracking.multiview.tracker import MIN_POINTS
 from shadowpuppet.tracking.people.figures import Figure, find_floor, find_people, telling
 from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.presence import certain_number, counted, sure_number
@@ -31,8 +32,6 @@ FLOOR_SETS = 6
 """Number of those on which the floor is found."""
 LEAST_AREA, LEAST_HEIGHT = 0.15, 0.4
 """Least area and height of another person in a picture, over the largest part's: one two and a half times as far away."""
-FEW_POINTS = 50
-"""Least number of surface points of all sets together that show people."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +48,8 @@ class Census:
         return find_people(self.floor, seen)
 
 
-def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes], share: Share = unshared) -> list[Seen]:
-    """What is seen in frames that were sampled from all films at the same times, `SETS` at most; `share` as for `synchronized_frames`."""
+def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes]) -> list[Seen]:
+    """What is seen in frames that were sampled from all films at the same times, `SETS` at most."""
     if not samples or not samples[0].frames:
         return []
     leader = samples[0]
@@ -61,10 +60,10 @@ def sampled_sets(samples: Sequence[Sample], silhouettes: Sequence[Silhouettes], 
         return [None if (near := _nearest(sample, frame.time, reach)) is None else each.segmented(near) for frame in chosen]
 
     with ThreadPoolExecutor(usable_cores(), "census") as pool:
-        return [shown_in(found, share) for found in zip(*pool.map(segmented, samples, silhouettes), strict=True)]
+        return [shown_in(found) for found in zip(*pool.map(segmented, samples, silhouettes), strict=True)]
 
 
-def later_sets(rig: Rig, silhouettes: Sequence[Silhouettes], after: float, share: Share = unshared) -> list[Seen]:
+def later_sets(rig: Rig, silhouettes: Sequence[Silhouettes], after: float) -> list[Seen]:
     """What is seen at `SETS` moments at most, spread over the rest of the films `after` a time (s): of people who come later. Found by
     seeking; none of ready silhouettes, and of films that do not state their length."""
     ends = [footage.count / footage.film.rate for footage in rig.footage if footage.count and np.isfinite(footage.film.rate)]
@@ -74,7 +73,7 @@ def later_sets(rig: Rig, silhouettes: Sequence[Silhouettes], after: float, share
     times = np.linspace(after + LATER / 2, begin + min(ends) - LATER / 2, SETS)
     with ThreadPoolExecutor(usable_cores(), "census") as pool:
         every = list(pool.map(lambda footage, each: list(_at(footage, each, times)), rig.footage, silhouettes))
-    return [shown_in(found, share) for found in zip(*every, strict=True)]
+    return [shown_in(found) for found in zip(*every, strict=True)]
 
 
 def _at(footage: Footage, silhouettes: Silhouettes, times: Array) -> Iterator[Segmented | None]:
@@ -91,7 +90,7 @@ def take_census(cameras: Sequence[Camera], sets: Sequence[Seen], later: Sequence
     with ThreadPoolExecutor(usable_cores(), "census") as pool:
         points = [surface.points for surface in pool.map(lambda seen: hull.points(seen.masks), sets)]
         everywhere = np.concatenate(points) if points else np.zeros((0, 3))
-        if len(everywhere) < FEW_POINTS:
+        if len(everywhere) < MIN_POINTS:
             return None
         floor = find_floor(cameras, everywhere, [sets[n] for n in evenly_spread(len(sets), FLOOR_SETS)])
         every = list(pool.map(lambda seen: find_people(floor, seen), sets))

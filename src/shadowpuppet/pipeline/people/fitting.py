@@ -16,13 +16,15 @@ from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.state import Measured
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, average_person, fit_in_views, known_person
+from shadowpuppet.tracking.multiview.size_estimation import MIN_FRAMES
 from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.presence import Followed, Sighting
+from shadowpuppet.tracking.people.tracker import VIEWS
 from shadowpuppet.tracking.people.views import views_of
 
-VIEWS, MIN_SETS, MOST_SETS = 3, 4, 16
-"""Least number of views (of all, if there are fewer cameras) and of frame sets that show a person apart for sizes to be measured, and the
-most sets that are used."""
+MOST_SETS = 16
+"""Greatest number of frame sets in which sizes are measured: those in which `VIEWS` (all, if there are fewer cameras) show a person
+apart."""
 TALL = 0.8, 2.3
 """Least and greatest height of a person, metres, that is expected of a figure; the sizes are refined from there."""
 
@@ -34,7 +36,7 @@ def fit_apart(rng: np.random.Generator, floor: Floor, options: Options, rate: fl
     views = [views_of(floor, each.figure, each.others, each.masks) for each in seen]
     apart = [view for view in views if sum(mask is not None for mask in view) >= min(VIEWS, len(cameras))]
     subject = None
-    if len(apart) >= min(MIN_SETS, len(seen)):
+    if len(apart) >= min(MIN_FRAMES, len(seen)):
         chosen = [apart[n] for n in evenly_spread(len(apart), MOST_SETS)]
         with contextlib.suppress(TrackingError):
             # fronts are found while people are tracked

@@ -27,7 +27,7 @@ from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.front import face
 from shadowpuppet.tracking.people.identity import CLEAR, DIFFERENT, Identity
 from shadowpuppet.tracking.people.presence import Followed, Sighting, follow, sightings
-from shadowpuppet.tracking.people.tracker import Person, Share, explained, follow_turned, place_of, start, step
+from shadowpuppet.tracking.people.tracker import SAME_PLACE, Person, Share, explained, follow_turned, place_of, start, step
 
 LOOK_SECONDS = 0.2
 """Seconds from one look for people to the next."""
@@ -36,12 +36,10 @@ NEW_SECONDS, NEW_LOOKS = 0.5, 3
 such a figure is forgotten."""
 GONE_SECONDS = 1.0
 """Time for which a person is lost until they count as gone."""
-SAME_PLACE = 0.6
-"""Distance (m) from a person within which a figure is theirs."""
 SAME_HEIGHT = 0.1
 """Greatest difference (m) between the height of a person who enters and that of one who has left, if they may be the same."""
-CLOSE, WITHIN = 0.6, 0.2
-"""Distance (m) of two people below which they may be exchanged; below which motion does not tell whether they were."""
+WITHIN = 0.2
+"""Distance (m) of two people who may have been exchanged, below which motion does not tell whether they were."""
 
 
 class Frames(NamedTuple):
@@ -194,7 +192,7 @@ class Group:
         identity, present = people.identity, [(person, self.place(person)) for person in people.present]
         for n, (one, place) in enumerate(present):
             for other, there in present[n + 1 :]:
-                if (away := float(np.linalg.norm(place - there))) < CLOSE:
+                if (away := float(np.linalg.norm(place - there))) < SAME_PLACE:
                     is_lost = one.lost_since is not None or other.lost_since is not None
                     identity = identity.meet(one.number, other.number, time, is_open=is_lost or away < WITHIN)
         identity, exchange = identity.decided(time, [person.number for person, _ in present if person.lost_since is None])

@@ -1,5 +1,4 @@
-"""Mirror images in depth, of an arm and of the trunk with both arms: other poses that one camera sees alike, and how well the silhouette
-allows them."""
+"""Mirror images of an arm in depth: other poses that one camera sees alike, and how well the silhouette allows them."""
 
 from __future__ import annotations
 
@@ -13,11 +12,11 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.segments import dofs_of
 from shadowpuppet.body.skeleton import SIDES
-from shadowpuppet.body.upper_body import TWIST
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.motion import Mode
+from shadowpuppet.tracking.doubt.doubt import STEP
 from shadowpuppet.tracking.doubt.variance import variance_model
 from shadowpuppet.tracking.monocular.settings import pixel_scale
 from shadowpuppet.tracking.silhouette_cost import Observation
@@ -26,16 +25,8 @@ FLIPS = ((-1, -1), (-1, 1), (1, -1))
 """Bones whose part along the view changes its sign: both, the upper arm, the forearm."""
 STEPS, DAMPING = 6, 1e-3
 """Steps of the search for a mirror image within the joints' limits, and their damping (m^2)."""
-DERIVATIVE = 1e-3
-"""Step of its derivatives, rad."""
 ALLOWED = 60.0
 """A mirror image counts half in the joints' variances if it costs this much more (pixels at 320 x 240), times ln 3."""
-TOGETHER_ALLOWED = 400.0
-"""The same of images of the trunk with both arms."""
-TOGETHER_STEPS, TOGETHER_STRIDE = 10, 0.6
-"""Steps of the search for these, and the bound of each (rad or m)."""
-BESIDE = 0.5
-"""Weight of the shoulders' places across the view, beside those of the other joints; their depths are free."""
 APART = 0.1
 """Distance (m) of elbow or wrist from which on two poses of an arm are different modes."""
 MOVED = 0.03
@@ -52,10 +43,10 @@ class Images(NamedTuple):
     more: Array
     """What each costs more than the pose (A, 3), pixels at 320 x 240."""
 
-    def displacements(self, points: Array, allowed: float = ALLOWED) -> Array:
+    def displacements(self, points: Array) -> Array:
         """Root mean square (L, 3), metres, of the landmarks' distances from those of the pose, `points` (L, 3), weighted by what the images
-        cost more: half for the cost `allowed`, times ln 3."""
-        likely = 1 / (1 + np.exp(np.clip(self.more / allowed, -30, 30)))
+        cost more: half for the cost `ALLOWED`, times ln 3."""
+        likely = 1 / (1 + np.exp(np.clip(self.more / ALLOWED, -30, 30)))
         return np.sqrt(np.einsum("ai,ailx->lx", likely, (self.points - points) ** 2))
 
 
@@ -69,33 +60,11 @@ class Mirrors:
         """The mirror images of a pose (D,) with landmarks `points` (L, 3), within the joints' limits."""
         if not self.arms:
             return Images(np.zeros((0, len(FLIPS), *points.shape)), np.zeros((0, len(FLIPS))))
-        return self._judged(pose, self.nearest(pose, points), observation, len(FLIPS))
-
-    def together(self, pose: Array, points: Array, observation: Observation) -> Images:
-        """Images of a pose (D,) with landmarks `points` (L, 3) in which both arms are mirrored about their shoulders and the trunk turns as
-        they make it, begun from its own twist and from the opposite one (1, 2); none of a body whose trunk does not twist."""
-        skeleton, names = self.picture.body.skeleton, self.picture.body.landmark_names
-        if TWIST not in skeleton.dof_names or len(self.arms) < len(SIDES):
-            return Images(np.zeros((0, 2, *points.shape)), np.zeros((0, 2)))
-        chains = np.array([chain for _, chain in self.arms])
-        ends = np.concatenate([chains[:, 1:].ravel(), [names.index("pelvis"), names.index("neck")], chains[:, 0]])
-        targets, weights = points[ends], np.ones((len(ends), 3))
-        targets[: 2 * len(chains)] = _mirrored(points[chains])[:, 0].reshape(-1, 3)
-        weights[-len(chains) :] = (BESIDE, BESIDE, 0)
-        start, every = np.repeat(pose[None], 2, axis=0), np.arange(len(pose))
-        start[1, skeleton.dof_names.index(TWIST)] *= -1
-        arms = np.concatenate([dofs for dofs, _ in self.arms])
-        start[:, arms] = 0.5 * (start[:, arms] + self._middle(pose)[arms])
-        poses = self._approach(start, np.stack([every] * 2), np.stack([ends] * 2), np.stack([targets.ravel()] * 2), weights.ravel(),
-                               TOGETHER_STEPS, TOGETHER_STRIDE)
-        return self._judged(pose, poses, observation, 2)
-
-    def _judged(self, pose: Array, poses: Array, observation: Observation, number: int) -> Images:
-        """The images `poses` (A * number, D) of a pose (D,)."""
+        poses = self.nearest(pose, points)
         costs = np.array([observation.cost_and_overlap(self.picture.draw(each))[0] for each in (pose, *poses)])
-        more = (costs[1:] - costs[0]).reshape(-1, number) / pixel_scale(self.picture.camera.size)
+        more = (costs[1:] - costs[0]).reshape(-1, len(FLIPS)) / pixel_scale(self.picture.camera.size)
         found = self.picture.points(poses)
-        return Images(found.reshape(-1, number, *found.shape[1:]), more)
+        return Images(found.reshape(-1, len(FLIPS), *found.shape[1:]), more)
 
     def modes(self, points: Array, images: Images) -> tuple[Mode, ...]:
         """Places of the arms, in the world, that differ from the estimate, `points` (L, 3), and from one another; the likelier first."""
@@ -122,27 +91,26 @@ class Mirrors:
         rows, poses = np.arange(len(jobs))[:, None], np.repeat(pose[None], len(jobs), axis=0)
         # begin half-way to the middle of the limits: from the estimate itself the derivatives may vanish
         poses[rows, dofs] = 0.5 * (poses[rows, dofs] + self._middle(pose)[dofs])
-        return self._approach(poses, dofs, ends, targets, np.ones(6), STEPS, 1.0)
+        return self._approach(poses, dofs, ends, targets)
 
     def _middle(self, pose: Array) -> Array:
         """The middle of the limits (D,); of degrees of freedom without limits, as in the pose (D,)."""
         low, high = self.picture.body.skeleton.limits
         return np.where(np.isfinite(high - low), 0.5 * (np.maximum(low, -np.pi) + np.minimum(high, np.pi)), pose)
 
-    def _approach(self, poses: Array, dofs: NDArray[np.int64], ends: NDArray[np.int64], targets: Array, weights: Array, steps: int,
-                  stride: float) -> Array:
-        """Poses (N, D) after Levenberg-Marquardt `steps`, each of `stride` at most (rad or m), of their `dofs` (N, d) that bring the
-        landmarks `ends` (N, E) to `targets` (N, 3 E), metres, with `weights` (3 E,), within the joints' limits."""
+    def _approach(self, poses: Array, dofs: NDArray[np.int64], ends: NDArray[np.int64], targets: Array) -> Array:
+        """Poses (N, D) after Levenberg-Marquardt steps, each of a radian at most, of their `dofs` (N, d) that bring the landmarks `ends`
+        (N, E) to `targets` (N, 3 E), metres, within the joints' limits."""
         low, high = self.picture.body.skeleton.limits
         rows, (number, width) = np.arange(len(poses)), dofs.shape
-        for _ in range(steps):
+        for _ in range(STEPS):
             tried = np.repeat(poses[:, None], width + 1, axis=1)
-            tried[rows[:, None], np.arange(1, width + 1), dofs] += DERIVATIVE
+            tried[rows[:, None], np.arange(1, width + 1), dofs] += STEP
             at = self.picture.points(tried.reshape(-1, poses.shape[1])).reshape(number, width + 1, -1, 3)
             at = at[rows[:, None, None], np.arange(width + 1)[:, None], ends[:, None]].reshape(number, width + 1, -1)
-            J, off = weights * (at[:, 1:] - at[:, :1]) / DERIVATIVE, weights * (targets - at[:, 0])
+            J, off = (at[:, 1:] - at[:, :1]) / STEP, targets - at[:, 0]
             step = np.linalg.solve(J @ J.transpose(0, 2, 1) + DAMPING * np.eye(width), J @ off[:, :, None])[..., 0]
-            moved = poses[rows[:, None], dofs] + np.clip(step, -stride, stride)
+            moved = poses[rows[:, None], dofs] + np.clip(step, -1.0, 1.0)
             poses[rows[:, None], dofs] = np.clip(moved, low[dofs], high[dofs])
         return poses
 

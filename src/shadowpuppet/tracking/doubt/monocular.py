@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.body.upper_body import BOW
 from shadowpuppet.camera.bits import unpack
 from shadowpuppet.camera.mask import Mask
@@ -19,8 +17,8 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, joints_of_limbs, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import levers_of, limb_of_part
-from shadowpuppet.tracking.doubt.mirror import TOGETHER_ALLOWED, Mirrors
-from shadowpuppet.tracking.doubt.steps import CONSTANT, Trail, stillness, surprise
+from shadowpuppet.tracking.doubt.mirror import Mirrors
+from shadowpuppet.tracking.doubt.steps import CONSTANT, stillness
 from shadowpuppet.tracking.frozen import is_frozen, same_silhouette
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 
@@ -28,14 +26,10 @@ SAMPLES = 24
 """Number of poses drawn from the particles."""
 TEMPERATURE = 100.0
 """A particle's weight falls to 1/e for this much more cost (pixels at 320 x 240): neighbouring pixels err together."""
-SHORTENING = 0.02
-"""Uncertainty (m) of a segment's length in the picture, from outline and body shape."""
 THIN = 0.03
 """Half width of what an inaccurate outline may leave over, as a share of the root of the person's area."""
 DISTANCE = 0.02
 """Standard deviation of the person's distance, over it: who is measured does not stand exactly where it was measured."""
-GOOD_MISFIT = 0.05
-"""Share of the pixels that differ though the pose is right."""
 REACH = 1.1
 """Radius about a limb's root, over the limb's length, in which unexplained silhouette may be this limb's."""
 TRUNK_REACH = 1.0
@@ -50,9 +44,6 @@ body that keeps its height can only imitate so. The silhouette may fit all the s
 class Before(NamedTuple):
     """What the next frame needs of this one."""
 
-    seconds: float
-    trail: Trail
-    """Of the landmarks, camera's frame."""
     mask: Mask
     """Silhouette (H, W)."""
     still: int
@@ -90,17 +81,14 @@ class MonocularDoubt:
         """What the frame shows about the accuracy of the estimate of a mask (H, W) at a time (s); and what the next frame needs.
 
         Axes are the camera's: x right, y down, z forward. Of every joint there are: a constant; the particles' spread across and along
-        the view; the distance in depth to its mirror image, which draws the same silhouette (an arm before or behind the body, the trunk
-        turned to the left or right); the error of depth by foreshortening; of its limb, the hidden share, the silhouette near it that
-        nothing explains, the share outside the silhouette and the share outside the picture, times the joint's lever; the same of what
-        does not match the arm's colours, if they are known, by which the hidden share is then multiplied; how far it left its course;
-        the misfit of the whole body; how long the silhouette has not changed; the depth by which the trunk bows; the distances to the
-        images of each arm, and of the trunk with both; and the error of the person's distance.
+        the view; the depth by which the trunk turns, and bows; of its limb, the hidden share, the silhouette near it that nothing explains,
+        the share outside the silhouette and the share outside the picture, times the joint's lever, the hidden share of an arm times what
+        does not match its colours, if they are known; how long the silhouette has not changed; the distances to
+        the mirror images of each arm; and the error of the person's distance.
         """
         points = self.tracker.picture.points(state.pose[None])[0]
         at, lever = dict(zip(self.names, points)), levers_of(self.names)
         still = before.still + 1 if before is not None and same_silhouette(before.mask, mask) else 0
-        trail = Trail() if before is None else before.trail
         spread = self._spread(state, points)
         # what is left out beside the body is no evidence for a pose, but one against the limbs near it
         known = state.observation if state.unexplained is None else None
@@ -108,41 +96,30 @@ class MonocularDoubt:
         images = self._mirrors.images(state.pose, points, observation)
         shares = self._shares(state.pose, points, mask, unpack(observation.ignore, mask.shape[1]))
         arms = None if state.observation is None else state.observation.arms
-        mismatch = {} if arms is None else self.tracker.arm_colours.mismatch(arms, state.pose)
-        for limb, share in mismatch.items():  # its colours show an arm before the trunk
+        for limb, share in ({} if arms is None else self.tracker.arm_colours.mismatch(arms, state.pose)).items():
             hidden, unexplained, outside, cut = shares[limb]
-            shares[limb] = (hidden * min(share, 1.0), unexplained, outside, cut)
+            shares[limb] = (hidden * share, unexplained, outside, cut)  # its colours show an arm before the trunk
         columns = np.array([shares.get(limb_of(name), (0.0,) * 4) for name in self.names]) * lever[:, None]
         found = dict(zip(("hidden", "unexplained", "outside", "cut"), columns.T)) | {
             "constant": np.full(len(points), CONSTANT),
             "spread": np.sqrt((spread[:, :2] ** 2).mean(1)),
             "spread_depth": spread[:, 2],
-            "mirrored": self._chains.mirrored(points),
-            "foreshortened": self._chains.foreshortened(points, at["left_shoulder"] - at["right_shoulder"]),
             "turned": np.full(len(points), abs(at["left_shoulder"][2] - at["right_shoulder"][2])),
             "bowed": np.full(len(points), abs(at["neck"][2] - at["pelvis"][2])),
-            "surprise": surprise(points, seconds, trail),
-            "misfit": np.fmax(1 - state.overlap - GOOD_MISFIT, 0) * lever,
             "still": stillness(still) * lever,
-            "coloured": np.array([mismatch.get(limb_of(name), 0.0) for name in self.names]) * lever,
         }
         components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}
         components["alternative"] = images.displacements(points)
-        components["together"] = self._mirrors.together(state.pose, points, observation).displacements(points, TOGETHER_ALLOWED)
         components["distance"] = points * (0, 0, DISTANCE)
         unseen = {limb: max(hidden, cut) for limb, (hidden, _, _, cut) in shares.items()}
         since = before.since if still and before is not None else seconds
         evidence = Evidence(components, unseen, is_frozen(still, seconds - since), self._mirrors.modes(points, images))
-        return evidence, Before(seconds, trail.with_frame(seconds, points), mask, still, since)
+        return evidence, Before(mask, still, since)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the L landmarks."""
         return self.tracker.picture.body.landmark_names
-
-    @cached_property
-    def _chains(self) -> Chains:
-        return Chains.of(self.names)
 
     @cached_property
     def _mirrors(self) -> Mirrors:
@@ -200,54 +177,3 @@ class MonocularDoubt:
         root = self.names.index("neck") if limb == "trunk" else own[0]
         length = TRUNK_REACH if limb == "trunk" else REACH * float(np.sqrt((np.diff(points[own], axis=0) ** 2).sum(1)).sum())
         return pixels[root], length * focal / points[root, 2]
-
-
-CHAINS = {"elbow": ("shoulder", "elbow"), "wrist": ("shoulder", "elbow", "wrist"), "hand": ("shoulder", "elbow", "wrist"),
-          "fist": ("shoulder", "elbow", "wrist"), "knee": ("hip", "knee"), "ankle": ("hip", "knee", "ankle")}
-"""Joints from a limb's root on whose directions a joint's place depends."""
-
-
-@dataclass(frozen=True, eq=False)
-class Chains:
-    """The bones from the limbs' roots to their joints."""
-
-    starts: NDArray[np.int64]
-    """Landmark at each bone's beginning (B,)."""
-    ends: NDArray[np.int64]
-    bears: Array
-    """1 where a landmark's place depends on a bone's direction, (L, B)."""
-    sided: NDArray[np.bool_]
-    """Whether a landmark is a limb's, (L,)."""
-
-    @classmethod
-    def of(cls, names: Sequence[str]) -> Chains:
-        """The chains among landmarks, by their names."""
-        chains = []
-        for name in names:
-            side, _, joint = name.partition("_")
-            chains.append([(f"{side}_{a}", f"{side}_{b}") for a, b in pairwise(CHAINS.get(joint, ()))])
-        bones = list(dict.fromkeys(bone for chain in chains for bone in chain))
-        starts, ends = np.array([[names.index(a), names.index(b)] for a, b in bones]).reshape(-1, 2).T
-        bears = np.array([[bone in chain for bone in bones] for chain in chains], float)
-        return cls(starts, ends, bears, np.array([name.partition("_")[0] in SIDES for name in names]))
-
-    def mirrored(self, points: Array) -> Array:
-        """How far in depth (L,), metres, landmarks (L, 3) move if the bones above them point as far to the front as to the back."""
-        return np.sqrt(self.bears @ (2 * self._along(points)[1]) ** 2)
-
-    def foreshortened(self, points: Array, across: Array) -> Array:
-        """Errors of depth (L,), metres, of landmarks (L, 3) if the bones above look longer or shorter by `SHORTENING`, and so half the line
-        of the shoulders, `across` (3,)."""
-        shoulders = _depth_errors(np.array([float(np.linalg.norm(across)) / 2]), across[2:] / 2)
-        return np.sqrt(self.bears @ _depth_errors(*self._along(points)) ** 2 + self.sided * shoulders**2)
-
-    def _along(self, points: Array) -> tuple[Array, Array]:
-        """Each bone's length, and its part along the view through its end (B,), metres."""
-        bones, ends = points[self.ends] - points[self.starts], points[self.ends]
-        return np.sqrt((bones**2).sum(1)), (bones * ends).sum(1) / np.sqrt((ends**2).sum(1))
-
-
-def _depth_errors(lengths: Array, depths: Array) -> Array:
-    """Errors of depth (B,) of bones that look longer or shorter by `SHORTENING`, from lengths and depths (B,), metres."""
-    seen = np.sqrt(np.maximum(lengths**2 - depths**2, 0))
-    return np.minimum(seen * SHORTENING / np.maximum(np.abs(depths), 1e-6), np.sqrt(2 * lengths * SHORTENING))

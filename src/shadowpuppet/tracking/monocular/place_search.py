@@ -39,9 +39,9 @@ ASIDE = (0.87, -0.87)
 """Directions (rad) to both sides that are tried if the person who faces the camera fits badly."""
 COMPARED = 5
 """Number of moments in which places are compared."""
-PRUNED, WELL = 0.15, 0.15
-"""A place is compared in all moments if its overlap in its own is at most this much under the best; a moment fits the chosen place if its
-overlap is at most this much under the median."""
+UNDER = 0.15
+"""A place is compared in all moments if its overlap in its own is at most this much under the best; so a moment fits the chosen place, but
+under the median."""
 
 
 class Place(NamedTuple):
@@ -82,7 +82,7 @@ def find_place(camera: Camera, masks: Sequence[Mask], height: float | None, dist
         best = found[int(np.argmax(overlap))]
     picture = best.picture(camera, body)
     overlaps = np.array([_overlap(picture, mask, turn) for mask in masks])
-    return Place(best, (overlaps >= np.median(overlaps) - WELL).tolist(), reached)
+    return Place(best, (overlaps >= np.median(overlaps) - UNDER).tolist(), reached)
 
 
 def _compared(camera: Camera, from_masks: Sequence[Mask], compared: Sequence[Mask], heights: Sequence[float], distances: Sequence[float],
@@ -91,7 +91,7 @@ def _compared(camera: Camera, from_masks: Sequence[Mask], compared: Sequence[Mas
     (rad)."""
     places = [(each, mask) for mask in from_masks for each in _candidates(camera, mask, heights, distances, sizes)]
     own = np.array([_overlap(each.picture(camera, body), mask, turn) for each, mask in places])
-    kept = [places[n][0] for n in np.flatnonzero(own >= own.max() - PRUNED)]
+    kept = [places[n][0] for n in np.flatnonzero(own >= own.max() - UNDER)]
     pictures = [each.picture(camera, body) for each in kept]
     return kept, np.array([np.median([_overlap(picture, mask, turn) for mask in compared]) for picture in pictures])
 

@@ -22,7 +22,7 @@ from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
-from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
+from shadowpuppet.tracking.multiview.tracker import MIN_POINTS, MultiviewTracker
 
 RATIO, FRAMES = 1.09, 5
 """Ratio of neighbouring heights that are tried, and number of frames they are tried on."""
@@ -34,8 +34,8 @@ large bodies fit, up to the walls of the hull."""
 PENALTY, DEVIATION = 0.02, 0.1
 """Relative cost of a height that deviates from the average by `DEVIATION` (m), that of adults in ANSUR II (Gordon et al. 2014), women and
 men together; it grows with the square, and is bounded for the sake of children."""
-LEAST_POINTS, STRAY = 50, 2
-"""Least number of surface points of a person; number of points at each end of an extent that may be noise."""
+STRAY = 2
+"""Number of points at each end of an extent that may be noise."""
 
 
 class FirstFrame(NamedTuple):
@@ -112,10 +112,14 @@ def lowest_point(before: float, here: float, after: float) -> float:
 
 def longest_extent(first: First) -> float | None:
     """The longest extent of the frames' surface points along their principal axes, metres, of 9 in 10 frames; None without points."""
-    extents = list[float]()
-    for points, *_ in first:
-        if len(points.points) > LEAST_POINTS:
-            middle = points.points - points.points.mean(0)
-            along = np.sort(middle @ np.linalg.svd(middle, full_matrices=False)[2].T, axis=0)
-            extents.append(float((along[-1 - STRAY] - along[STRAY]).max()))
-    return float(np.percentile(extents, 90)) if extents else None
+    longest = [float(extents(points.points)[0]) for points, *_ in first if len(points.points) > MIN_POINTS]
+    return float(np.percentile(longest, 90)) if longest else None
+
+
+def extents(points: Array) -> Array:
+    """Extents (3,) of surface points (P, 3) along their principal axes, the longest first, metres, and 0 of too few points."""
+    if len(points) <= MIN_POINTS:
+        return np.zeros(3)
+    middle = points - points.mean(0)
+    along = np.sort(middle @ np.linalg.svd(middle, full_matrices=False)[2].T, axis=0)
+    return np.sort(along[-1 - STRAY] - along[STRAY])[::-1]

@@ -56,13 +56,13 @@ class MultiviewObservation:
     """One frame: surface points, and the masks (H, W) that they were made from, one per camera, None for a camera without one."""
 
     def __init__(self, views: BodyInViews, surface: SurfacePoints, masks: Sequence[Mask | None], also: Cost | None = None,
-                 left_out: Sequence[Bits | None] = (), halves: Halves | None = None, around: Sequence[Bits] | None = None) -> None:
+                 left_out: Sequence[Bits | None] = (), halves: Halves | None = None) -> None:
         """Everything is computed on first use. `also`: a cost of your own (m^2), added to that of the surface. `left_out`: pixels of the
         views' pictures that are no evidence, bits for each camera or none; surface points there are left out. `halves`: the masks at half
-        size, if known. `around`: the body as expected in each view's picture; free space is computed near it alone."""
+        size, if known."""
         self.views, self.masks, self.also = views, masks, also
         self.left_out = tuple(left_out) or (None,) * len(masks)
-        self.around, self._known_halves = around, halves
+        self._known_halves = halves
         self.keypoints: KeypointEvidence | None = None
         self.surface = _without(surface, views, self.left_out)
 
@@ -115,8 +115,7 @@ class MultiviewObservation:
     @cached_property
     def space(self) -> FreeSpace:
         """Distances to the silhouettes' outlines, for the silhouette constraint."""
-        around = None if self.around is None else [self.around[n] for n in self.seen]
-        return free_space([(picture.camera, mask) for picture, mask in self.people], around)
+        return free_space([(picture.camera, mask) for picture, mask in self.people])
 
     @cached_property
     def area(self) -> int:

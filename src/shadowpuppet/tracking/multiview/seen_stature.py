@@ -18,7 +18,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
-from shadowpuppet.tracking.multiview.height_estimation import LEAST_POINTS, STRAY
+from shadowpuppet.tracking.multiview.height_estimation import extents
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.settings import HullSettings, MultiviewSettings
 from shadowpuppet.tracking.multiview.size_estimation import (
@@ -59,15 +59,6 @@ class SeenStature(NamedTuple):
     """Of the person in the calibration's metres."""
     overlap: float
     """Mean intersection over union of the fitted body and the silhouettes."""
-
-
-def extents(points: Array) -> Array:
-    """Extents (3,) of surface points (P, 3) along their principal axes, the longest first, metres, and 0 of too few points."""
-    if len(points) <= LEAST_POINTS:
-        return np.zeros(3)
-    middle = points - points.mean(0)
-    along = np.sort(middle @ np.linalg.svd(middle, full_matrices=False)[2].T, axis=0)
-    return np.sort(along[-1 - STRAY] - along[STRAY])[::-1]
 
 
 def hull_points(cameras: Sequence[Camera], masks: Sequence[Mask | None], settings: HullSettings) -> Array:

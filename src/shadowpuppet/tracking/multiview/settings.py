@@ -59,9 +59,6 @@ class GaussNewtonSettings:
     emptiness: NonNegative = 2.0
     """Weight of the mean squared distance by which limbs reach out of the silhouettes, with fewer than six cameras. A quarter of it if all
     films have lost detail to compression."""
-    finalists: Annotated[float, Field(gt=0, le=1)] = 0.3
-    """With five cameras and more: share of the poses, those that cost least after the coarse iterations, that go through the fine ones, at
-    least eight; the others are dropped. With 0.15, made recordings are 2 % less accurate. With fewer cameras all go on."""
     damping: Positive = 0.03
     """Initial damping, as a share of each DOF's curvature."""
     pull: NonNegative = 1e-5
@@ -173,16 +170,16 @@ class MultiviewSettings:
     """How surface points are computed from the silhouettes."""
 
 
-LONG_FRAME, CYCLE_TIME, MOST_CYCLES = 0.05, 1 / 30, 4
-"""Time of a frame, s, from which on proposals take the last frame's motion along; time for which one cycle suffices; most cycles. People
-who walk move by a head's width in a tenth of a second: noise that suffices for 30 frames/s loses them."""
+CYCLE_TIME, MOST_CYCLES = 1 / 30, 4
+"""Time, s, for which one cycle suffices; most cycles. People who walk move by a head's width in a tenth of a second: noise that suffices
+for 30 frames/s loses them. Proposals of frames that last longer than one cycle and a half take the last frame's motion along, too."""
 
 
 def for_rate(settings: MultiviewSettings, rate: float) -> MultiviewSettings:
     """The settings with what they leave to the frame rate (frames/s)."""
     seconds = 1 / rate
     cycles = min(max(round(seconds / CYCLE_TIME), 1), MOST_CYCLES) if settings.cycles is None else settings.cycles
-    velocity = float(seconds > LONG_FRAME) if settings.velocity is None else settings.velocity
+    velocity = float(seconds > 1.5 * CYCLE_TIME) if settings.velocity is None else settings.velocity
     return replace(settings, cycles=cycles, velocity=velocity)
 
 
@@ -226,7 +223,6 @@ MULTIVIEW_PRESETS: dict[str, dict] = {
         "recover": False,
         "surface": {"epsilon": 0.3, "tau": 0.06, "nearest": "euclidean"},
         "forces": {"rho": "quadratic"},
-        "gauss_newton": {"finalists": 1.0},
     },
 }
 """Named settings of the tracker for several cameras, as `PRESETS`."""

@@ -52,8 +52,9 @@ FEW_CAMERAS, MANY_CAMERAS = 4, 6
 the surface points are precise enough without free space."""
 PARTICLES = (40, 24, 16)
 """Default particle numbers with up to `FEW_CAMERAS`, between, and from `MANY_CAMERAS` on."""
-FEWEST_FINALISTS = 8
-"""Least number of poses that go through the fine iterations of Gauss-Newton, if there are as many."""
+FINALISTS = 8
+"""Number of poses, those that cost least after the coarse iterations of Gauss-Newton, that go through the fine ones with more than
+`FEW_CAMERAS`."""
 
 
 class MultiviewState(NamedTuple):
@@ -308,8 +309,7 @@ class MultiviewTracker:
         coarse = Pass(observation.cloud(g.share), g.coarse, g.coarse_tau, space, g.emptiness, *observation.rays)
         fine = Pass(observation.full, g.fine, g.fine_tau, space, g.emptiness, *observation.rays)
         centre, pull = self.posture_prior.quadratic(last, g.pull, s.posture)
-        share = g.finalists if len(self.cameras) > FEW_CAMERAS else 1.0
-        number = max(FEWEST_FINALISTS, round(share * self.number))
+        number = FINALISTS if len(self.cameras) > FEW_CAMERAS else self.number
 
         def refine(poses: Array) -> tuple[Indices, Array]:
             rough, costs = self.refiner.descend(poses, coarse, centre, pull, g.damping)

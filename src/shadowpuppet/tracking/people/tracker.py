@@ -41,8 +41,8 @@ VIEWS = 3
 SHOWN, SIDE = 0.6, np.radians(45)
 """Least share of the drawn body that a view shows apart from other people; least angle (rad) from the front or the back of a view from the
 side."""
-ROUND_FIGURE = 0.6
-"""Distance (m) from a figure up to which surface points are searched for its person."""
+SAME_PLACE = 0.6
+"""Distance (m) on the floor up to which a figure, or surface points about it, may be a person's."""
 
 
 class Person(NamedTuple):
@@ -90,7 +90,7 @@ def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Ma
     def follow(n: int, evidence: Division) -> tuple[MultiviewState, Drawn]:
         tracker, rng, state = people[n]
         own, ignored = evidence.of(n)
-        observation = PersonObservation(tracker.views, own, masks, None, ignored, halves, evidence.drawn[n].bits)
+        observation = PersonObservation(tracker.views, own, masks, None, ignored, halves)
         state = _judged(tracker.follow(rng, state, observation))
         return state, draw_person(tracker, state.pose)
 
@@ -112,7 +112,7 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
           masks: Sequence[Mask | None]) -> Begun | None:
     """The first state of a person at the place of a figure, beside those who are `drawn`; None if there are too few points. Points
     and masks (H, W) as in `step`."""
-    mine = np.linalg.norm(points.points[:, :2] - figure.place, axis=1) < ROUND_FIGURE
+    mine = np.linalg.norm(points.points[:, :2] - figure.place, axis=1) < SAME_PLACE
     for other in drawn.values():
         mine &= other.distances(points.points) > 0.05
     own = points.picked(mine)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.smoothing.projection import Points, at_limits, derivatives
+from shadowpuppet.tracking.smoothing.projection import MAX_STEP, Points, at_limits, derivatives
 
 STEPS, LEAST_GAIN = 10, 1e-3
 """Steps at most, and the share of the cost by which a step must lower it for another to follow."""
@@ -24,8 +24,6 @@ STIFFNESS = 1e-3
 """Added to the diagonal (1 / rad^2 or 1 / m^2)."""
 REACH = 3
 """Greatest distance, in frames, of poses that are coupled."""
-MAX_STEP = 0.3
-"""Bound of a step (rad or m)."""
 
 
 class PathCost(NamedTuple):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt, map_coordinates
 
-from shadowpuppet.camera.bits import pack
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
 from shadowpuppet.tracking.multiview.refinement.free_space import (
@@ -17,7 +16,6 @@ from shadowpuppet.tracking.multiview.refinement.free_space import (
     Spheres,
     free_space,
     push_inside,
-    reach,
     spheres_in,
 )
 from shadowpuppet.tracking.multiview.refinement.part_sums import SUMS
@@ -99,25 +97,6 @@ def test_the_sums_are_the_cost_s_derivative(rng):
     told = -2 * sums[:, 21:27]
     assert np.linalg.norm(told) > 1e-4
     assert np.linalg.norm(numeric - told) < 0.15 * np.linalg.norm(told)
-
-
-def test_near_a_body_distances_are_those_of_the_whole_picture_and_where_no_silhouette_is_near_all_are_taken(rng):
-    of = actor.body()
-    pose = actor.stance(of.skeleton)
-    views = seen(of, pose, ring(3))
-    bodies = [mask.copy() for _, mask in views]
-    for _, mask in views:
-        mask[:, :60] = mask[:, -60:] = True  # other people
-    near, whole = free_space(views, list(map(pack, bodies))), free_space(views)
-    assert len(near.fields) < 0.8 * len(whole.fields)
-    for spread in (0.02, 0.1):
-        T = of.skeleton.forward(of.skeleton.clamp((pose + rng.normal(0, spread, len(pose)))[None]))[0]
-        np.testing.assert_allclose(reach(T, spheres_in(of.limbs), near), reach(T, spheres_in(of.limbs), whole), atol=0.01)
-    elsewhere = np.zeros_like(bodies[0])
-    elsewhere[:20, :20] = True
-    for body in (bodies[0], np.zeros_like(bodies[0])):  # with no silhouette near it, or not in the picture
-        far = [(views[0][0], elsewhere)]
-        np.testing.assert_array_equal(free_space(far, [pack(body)]).windows, free_space(far).windows)
 
 
 def test_an_arm_that_reaches_out_is_brought_back_without_any_surface_to_draw_it(rng):

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Limbs
-from shadowpuppet.camera.bits import Bits, count, window_of_bits
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.mask import Mask, Window, bounding_window
+from shadowpuppet.camera.mask import Mask, bounding_window
 from shadowpuppet.camera.projection import NEAR_PLANE, bend_within, make_lens
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import device, kernel
@@ -30,9 +29,8 @@ OUTVOTING_CAMERAS = 3
 """If a sphere's centre is outside one silhouette only and inside at least this many others, the one is ignored: it may lack a limb."""
 TRUSTED_CAMERAS = 2
 """The same where sizes are solved for: a chair before a limb cuts it off in one silhouette, and the limb must not shrink for it."""
-WINDOW_MARGIN, BODY_MARGIN = 24, 0.5
-"""Margin (pixels) around the silhouettes in which distances are computed, farther out they are extrapolated; and around a body, over the
-square root of its area: some 40 cm."""
+WINDOW_MARGIN = 24
+"""Margin (pixels) around the silhouettes in which distances are computed; farther out they are extrapolated."""
 
 
 class Spheres(NamedTuple):
@@ -75,12 +73,11 @@ def spheres_in(limbs: Limbs, lengths: Array | None = None) -> Spheres:
     return Spheres(np.array(joints), np.array(places), np.array(radii), np.array(which))
 
 
-def free_space(views: Sequence[tuple[Camera, Mask]], around: Sequence[Bits] | None = None) -> FreeSpace:
-    """Distances for cameras and their masks (H, W); every mask shows a person. `around`: of each the pixels of the body whose limbs are
-    looked at, so that distances are computed near them alone; None: all around the silhouettes."""
+def free_space(views: Sequence[tuple[Camera, Mask]]) -> FreeSpace:
+    """Distances for cameras and their masks (H, W); every mask shows a person."""
     fields, windows, start = [np.zeros(0, np.float32)], [], 0
-    for (camera, mask), body in zip(views, around or (None,) * len(views), strict=True):
-        rows, columns = _window(mask, body)
+    for camera, mask in views:
+        rows, columns = bounding_window(mask, WINDOW_MARGIN)
         field = _distances(mask[rows, columns])
         fields.append(field.ravel())
         windows.append((start, columns.start, rows.start, field.shape[1], field.shape[0], *camera.size))
@@ -94,15 +91,6 @@ def free_space(views: Sequence[tuple[Camera, Mask]], around: Sequence[Bits] | No
         np.array([camera.matrix for camera, _ in views], float).reshape(-1, 3, 3),
         np.array(bends, float).reshape(-1, 11),
     )
-
-
-def _window(mask: Mask, body: Bits | None) -> Window:
-    """Rows and columns around a silhouette (H, W), or around a body where silhouette is near it."""
-    if body is not None and (area := count(body)):
-        window = window_of_bits(body, max(WINDOW_MARGIN, round(BODY_MARGIN * area**0.5)))
-        if mask[window].any():
-            return window
-    return bounding_window(mask, WINDOW_MARGIN)
 
 
 def _distances(mask: Mask) -> NDArray[np.float32]:

@@ -106,7 +106,7 @@ def spaced_vertices(lines, outward, step):  # pragma: no cover
 
 
 def cut_rays(camera: Indices, rays: Array, relative: Array, lines: Array, spans: Indices, circles: Array, bounds: Indices, lenses: Array,
-        tolerated: int = 0, longest: float = np.inf, witnesses: int = 1) -> tuple[Indices, Array]:
+        tolerated: int = 0, longest: float = np.inf) -> tuple[Indices, Array]:
     """Viewing edges of rays (R, 3), z = 1, from views `camera` (R,): the index (E,) of each edge's ray, and its depths (E, 2).
 
     Args:
@@ -114,8 +114,6 @@ def cut_rays(camera: Indices, rays: Array, relative: Array, lines: Array, spans:
         lines: vertices (2, N) of all polygons.
         spans, circles: runs (C, 2) and their circles (3, C); view j's are those from `bounds[j]` to `bounds[j + 1]`.
         tolerated: number of views that may deny a place, on rays that have no viewing edge of at most `longest` (m) otherwise.
-        witnesses: number of other views, or all if there are fewer, in whose pictures the middle of an edge must lie; if more than one, its
-            first or last quarter will do.
     """
     apart = np.linalg.norm(relative[:, :, :3, 3], axis=2) > MIN_BASELINE  # no view carves its own rays
     most = lines.shape[1] + 2  # each side is crossed at most once
@@ -124,14 +122,14 @@ def cut_rays(camera: Indices, rays: Array, relative: Array, lines: Array, spans:
     room = 2 * len(rays) + most
     while True:
         ray, depths = np.empty(room, np.int64), np.empty((room, 2))
-        count, done = _cut(camera, rays, relative, apart, polygons, lenses, tolerated, longest, witnesses, scratch, ray, depths)
+        count, done = _cut(camera, rays, relative, apart, polygons, lenses, tolerated, longest, scratch, ray, depths)
         if done:
             return ray[:count], depths[:count]
         room *= 4
 
 
 @kernel
-def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, longest, witnesses, scratch, ray, depths):  # pragma: no cover
+def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, longest, scratch, ray, depths):  # pragma: no cover
     """Fill `ray` and `depths`; returns the number of edges, and whether the arrays had room for all."""
     count, pieces = 0, scratch[-1]
     for r in range(rays.shape[0]):
@@ -142,15 +140,11 @@ def _cut(camera, rays, relative, apart, polygons, lenses, tolerated, longest, wi
         while level <= tolerated and not short:
             count = before  # the next level has the same edges, and longer ones
             at, n = _leave(relative, i, apart, u, v, polygons, level, scratch)
-            k, needed = 0, max(min(witnesses, apart[i].sum()), (1 + CONFIRMING_VIEWS) * level)
+            k, needed = 0, max(min(1, apart[i].sum()), (1 + CONFIRMING_VIEWS) * level)
             while k < n:
                 lo, hi, k = _whole(pieces, at, n, k)
                 found = lo > NEAR_PLANE and hi < FAR and hi - lo > MIN_LENGTH
-                seen = found and _witnessed(relative, i, apart, u, v, (lo + hi) / 2, lenses, needed)
-                if found and not seen and witnesses > 1:
-                    seen = (_witnessed(relative, i, apart, u, v, lo + 0.25 * (hi - lo), lenses, needed)
-                            or _witnessed(relative, i, apart, u, v, lo + 0.75 * (hi - lo), lenses, needed))  # fmt: skip
-                if seen:
+                if found and _witnessed(relative, i, apart, u, v, (lo + hi) / 2, lenses, needed):
                     ray[count], depths[count, 0], depths[count, 1] = r, lo, hi
                     count += 1
                     short |= hi - lo <= most

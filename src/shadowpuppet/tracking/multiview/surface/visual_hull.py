@@ -6,7 +6,7 @@ silhouettes (Matusik et al. 2000, "Image-based visual hulls").
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -126,21 +126,6 @@ class VisualHull:
         given = {n: check_mask(mask, camera.size, f"camera {camera.name!r}: mask")
                  for n, (mask, camera) in enumerate(zip(masks, self.cameras)) if mask is not None}
         return {n: mask for n, mask in given.items() if may_be_person(mask)}
-
-    def lengths_inside(self, people: Mapping[int, Mask], camera: NDArray[np.int64], pixels: Array) -> Array:
-        """Lengths (P,), metres, of each viewing ray's longest part that lies inside the silhouettes of all other cameras, its middle, first
-        or last quarter in all their pictures; 0 where there is none.
-
-        people: masks (H, W) by the camera's index, in order. camera, pixels: the rays, as pixels (P, 2) of cameras (P,), by index.
-        """
-        which, rays = np.array(list(people)), np.zeros((len(pixels), 3))
-        for n in people:
-            rays[camera == n] = self.cameras[n].rays(pixels[camera == n])
-        carving = self._carving([_silhouette(mask, self._views[n]) for n, mask in people.items()], which)
-        ray, depths = cut_rays(np.searchsorted(which, camera), rays, *carving, witnesses=len(which) - 1)
-        out = np.zeros(len(pixels))
-        np.maximum.at(out, ray, np.linalg.norm(rays[ray], axis=1) * (depths[:, 1] - depths[:, 0]))
-        return out
 
     def _edges(self, silhouettes: list[_Silhouette], which: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array, Array, Array]:
         """Viewing edges: camera (E,), ray (E, 3) with z = 1, normal (E, 3), both in the camera's frame, and depths (E, 2)."""

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.frozen import LEAST
 
 FALL = 0.2
 """Fall of a camera's overlap below the usual one from which on it is asked which one the others fit better without."""
@@ -15,15 +16,13 @@ SUSPECT = 0.03
 """The same from which on a camera may be that one: the body may have followed the wrong camera, and left a good one."""
 GAIN = 0.03
 """Least gain of the others' mean overlap without it."""
-LEAST_OTHERS = 2
-"""Least number of cameras that remain."""
 ADAPT, ADAPT_ODD = 0.1, 0.03
 """Weight of a frame in the usual overlap, and that of a frame in which the camera is the odd one: in the end it is heard again."""
 
 
 def suspects(usual: Array, now: Array) -> list[int]:
     """Cameras whose overlap has fallen, if one has fallen far. `usual`, `now`: overlaps (C,), NaN where there is none."""
-    if usual.shape != now.shape or np.isfinite(now).sum() <= LEAST_OTHERS:
+    if usual.shape != now.shape or np.isfinite(now).sum() <= LEAST:
         return []
     fall = np.nan_to_num(usual - now, nan=0.0)
     return np.flatnonzero(fall > SUSPECT).tolist() if fall.max() > FALL else []

@@ -22,15 +22,13 @@ class RigWatch:
 
     def __call__(self, seconds: float, seen: Seen) -> Seen:
         """What is seen in a frame set at a time (s), without masks and keypoints of cameras that are set aside. A single camera is
-        never set aside: when it is blind is only noted. A frozen picture's own masks stay alike, whatever other cameras add to them."""
-        masks, own = seen.masks, seen.own
+        never set aside: when it is blind is only noted."""
         if not self._many:
-            self._watch.aside.note(seconds, ["blind" if is_blind(mask) else "" for mask in masks])
+            self._watch.aside.note(seconds, ["blind" if is_blind(mask) else "" for mask in seen.masks])
             return seen
-        kept = self._steps(seconds, self._watch(seconds, own or masks))
-        found = (None if aside else each for aside, each in zip(map(operator.is_not, kept, own or masks), seen.keypoints))
-        return seen._replace(masks=tuple(None if of_own is None else mask for of_own, mask in zip(kept, masks, strict=True)),
-                             keypoints=tuple(found))
+        kept = self._steps(seconds, self._watch(seconds, seen.masks))
+        found = (None if aside else each for aside, each in zip(map(operator.is_not, kept, seen.masks), seen.keypoints))
+        return seen._replace(masks=kept, keypoints=tuple(found))
 
     def tracked(self, drawn: Sequence[Bits]) -> None:
         """The body of the first frame set that has none yet, as `StepWatch.tracked` expects it."""
