@@ -23,7 +23,7 @@ FOLDERS = ("video", "background", "masks", "references", "keypoints")
 PATTERNS = ("calibration.toml", "recording.toml", "truth.*", "truth_*.csv", "training.*")
 """Its other files."""
 READ = {*FILM_SUFFIXES, *IMAGE_SUFFIXES, *ENDINGS, ".csv"}
-"""Endings of files that are read in a folder of pictures, of calibrations or of keypoints; programs that show folders put other files there."""
+"""Endings of files that are read in a folder of pictures, calibrations or keypoints; programs that show folders put other files there."""
 MOST_NAMED = 3
 """Greatest number of files that a sentence names."""
 
