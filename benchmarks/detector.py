@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.geometry import Array, unit
@@ -33,6 +34,8 @@ class Detector(NamedTuple):
 
 USUAL = Detector()
 EXACT = Detector(0.0, 0.4, 0.0, 0.0, 0.0, 0.0)
+DETECTORS = {"made": USUAL, "poor": Detector(scale=0.015, misses=0.3, exchanges=0.2, offset=0.02)}
+"""Usual errors, and those of small or blurred people."""
 
 
 def detected(rng: np.random.Generator, cameras: Sequence[Camera], times: Array, names: Sequence[str], joints: Array,
@@ -40,11 +43,12 @@ def detected(rng: np.random.Generator, cameras: Sequence[Camera], times: Array, 
     """Keypoints by frame and camera of a person's joints (T, K, 3), world; `names`: with sides, the left before the right of each pair."""
     T, K = joints.shape[:2]
     beside = joints + (by.offset * _mirrored(rng.standard_normal((K, 3)), names) @ _trunk(names, joints))
-    seen, nobody = [_in_one(rng, camera, times, beside, by) for camera in cameras], np.array([-1])
+    seen, nobody = [_in_one(rng, camera, times, names, beside, by) for camera in cameras], np.array([-1])
     return [[Keypoints(tuple(names), xy[t][None], sure[t][None], nobody, "made") for xy, sure in seen] for t in range(T)]
 
 
-def _in_one(rng: np.random.Generator, camera: Camera, times: Array, joints: Array, by: Detector) -> tuple[Array, Array]:
+def _in_one(rng: np.random.Generator, camera: Camera, times: Array, names: Sequence[str], joints: Array,
+            by: Detector) -> tuple[Array, Array]:
     """Pixels (T, K, 2) and confidences (T, K) of one camera."""
     T, K = joints.shape[:2]
     keep = np.exp(-np.median(np.diff(times)) / by.memory) if T > 1 else 0.0
@@ -56,7 +60,7 @@ def _in_one(rng: np.random.Generator, camera: Camera, times: Array, joints: Arra
     pixel = camera.matrix[0, 0] / np.linalg.norm(joints - camera.centre, axis=2)[..., None]
     xy = xy + pixel * (by.scale * normal * thick + np.where(is_inside(camera, xy)[..., None], 0, by.outside * normal))
     for begin, end in _runs(rng, times, by.exchanges, 0.2, 2.0):
-        xy[begin:end] = xy[begin:end, np.arange(K) ^ 1]
+        xy[begin:end] = xy[begin:end, other_side(names)]
     confidence = np.clip(1 - 0.15 * np.abs(rng.standard_normal((T, K))), 0.05, 1)
     for k in range(K):
         for begin, end in _runs(rng, times, by.misses, 0.3, 0.3):

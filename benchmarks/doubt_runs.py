@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
+from functools import partial
+from itertools import combinations, islice
 from pathlib import Path
 
 import numpy as np
 from cases import Case
+from keypoints import with_keypoints
 from numpy.typing import NDArray
 from proving_ground import HERE as GROUND
 from proving_ground import made as made_ground
@@ -17,18 +19,19 @@ from spoiled import SPOILS
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.camera.mask import Mask, Seen
 from shadowpuppet.evaluation.joint_angles import wrapped
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, unit
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import BLANK, JointTable, Mode, MotionBuilder, MotionFrame
 from shadowpuppet.motion.synchronization import at_times
 from shadowpuppet.pipeline.findings.rig import survey_rig
-from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.rig import open_rig, read_frames
+from shadowpuppet.pipeline.silhouettes import segments_of
 from shadowpuppet.synthetic import proving_rings, synthesize
 from shadowpuppet.tracking.doubt.doubt import Points, pose_deviations, state_doubt
 from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
-from shadowpuppet.tracking.doubt.multiview import MultiviewDoubt
+from shadowpuppet.tracking.doubt.multiview import MultiviewDoubt, kind_of
 from shadowpuppet.tracking.doubt.variance import ModeWeights, variance_model
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
@@ -189,40 +192,60 @@ def track_monocular(path: Path) -> Iterator[Tracked]:
                       off, np.array(deviations), np.array(statuses), model.modes)
 
 
+SIGHTINGS = {"keypoints": (("mediapipe", 0), ("mediapipe", 2), ("poor", 0), ("poor", 2)), "keypoints_one": (("mediapipe", 1), ("poor", 1)),
+             "both": (("mediapipe", 0), ("poor", 0))}  # fmt: skip
+"""For each kind of doubt detectors, and the number of cameras; 0: all."""
+BESIDE = ("second person", "obstacle", "thing", "grown")
+"""Faults of silhouettes that are tried beside keypoints."""
 ONE_CAMERA = ("frozen", "obstacle", "thing", "late")
 """Faults that, of several cameras, only the first has."""
 LATE = 5
 """Frames by which the camera is late."""
 
 
-def track_multiview(path: Path) -> Iterator[Tracked]:
-    """A recording of several cameras with every fault. Errors are those of the smoothed motion, which is what a run's deviations are stated
-    of: the backward pass keeps feet on the floor."""
-    options = make_options({"overlay": False})
+def track_multiview(path: Path, kind: str = "multiview") -> Iterator[Tracked]:
+    """A recording of several cameras with every fault, or each of `SIGHTINGS` if keypoints are evidence. Errors are those of the smoothed
+    motion, which is what a run's deviations are stated of: the backward pass keeps feet on the floor."""
+    late: Fault = lambda rng, masks, rate: [masks[max(n - LATE, 0)] for n in range(len(masks))]  # noqa: E731
+    if kind == "multiview":
+        yield from tracked_with(path, make_options({"evidence": "silhouettes"}), FAULTS | {"late": late})
+    for detector, cameras in SIGHTINGS.get(kind, ()):
+        known = with_keypoints(path, detector)
+        options = {"evidence": "silhouettes,keypoints" if kind == "both" else "keypoints"}
+        options |= {"camera": ",".join(across(known)[:cameras])} if cameras else {}
+        faults = {name: FAULTS[name] for name in ("clean", *(BESIDE if kind == "both" and detector == "mediapipe" else ()))}
+        for run in tracked_with(known, make_options(options), faults):
+            is_clean = detector == "mediapipe" and cameras < 2 and run.fault == "clean"
+            yield replace(run, recording=path.name, fault="clean" if is_clean else f"{detector}, {cameras or 'all'} cameras, {run.fault}")
+
+
+def tracked_with(path: Path, options: Options, faults: Mapping[str, Fault]) -> Iterator[Tracked]:
+    """A recording of several cameras tracked with some faults."""
     survey = survey_rig(open_rig(path, options), options)
     subject = fit_multiview(np.random.default_rng(0), survey, options)
     truth, rate = read_joints(path / "truth.csv"), survey.rig.rate
-    frames = [(each.time, each.seen.masks) for each in read_frames(survey.rig, [each.segmented for each in survey.silhouettes])]
-    empty = [np.zeros(camera.size[::-1], bool) for camera in subject.hull.cameras]
-    films = [[none if (mask := masks[n]) is None else mask for _, masks in frames] for n, none in enumerate(empty)]
+    frames = [(each.time, each.seen) for each in read_frames(survey.rig, segments_of(survey.rig, survey.silhouettes))]
+    empty = [np.zeros(camera.size[::-1], bool) for camera in subject.tracker.cameras] if survey.silhouettes else []
+    films = [[none if (mask := seen.masks[n]) is None else mask for _, seen in frames] for n, none in enumerate(empty)]
     times, body, names = [time for time, _ in frames], subject.body, subject.body.landmark_names
     smoother = MotionSmoother(body.skeleton, subject.joints, gaps=0)
-    late: Fault = lambda rng, masks, rate: [masks[max(n - LATE, 0)] for n in range(len(masks))]  # noqa: E731
-    for n, (fault, spoil) in enumerate((FAULTS | {"late": late}).items()):
+    for n, (fault, spoil) in enumerate(faults.items()):
         spoiled = [spoil(np.random.default_rng([n, m]), film, rate) if m == 0 or fault not in ONE_CAMERA else film
                    for m, film in enumerate(films)]
+        sets = zip(*spoiled, strict=True) if films else (seen.masks for _, seen in frames)
         rng, doubt, state, before, rows = np.random.default_rng(1), MultiviewDoubt(subject.tracker), None, None, []
         motion = MotionBuilder("", [dof.name for dof in body.skeleton.dofs], [names[column] for column in subject.joint_columns])
-        for seconds, masks in zip(times, zip(*spoiled)):
-            observation = subject.observe(Seen(masks))
+        for (seconds, seen), masks in zip(frames, sets, strict=True):
+            observation = subject.observe(Seen(masks, keypoints=seen.keypoints))
             state = subject.next_state(rng, state, observation)
             if state is None:
                 motion.append(MotionFrame(seconds, "absent"))
                 rows.append(None)
                 continue
-            found, before = doubt.evidence(state, observation.points, masks, seconds, before)
+            shown = subject.tracker.shown(observation.points, masks, seen.keypoints, state.pose)
+            found, before = doubt.evidence(state, observation.points, masks, seconds, before, shown)
             rows.append(found.components)
-            stated = state_doubt("multiview", found, names, body.skeleton, body.points, state.pose, state.status, np.eye(3))
+            stated = state_doubt(kind_of(masks, shown), found, names, body.skeleton, body.points, state.pose, state.status, np.eye(3))
             motion.append(MotionFrame(seconds, state.status, state.pose, subject.joints(state.pose[None])[0], stated.pose_sd,
                                       stated.joint_sd[subject.joint_columns], state.cost, state.overlap))
         poses = smoother(motion.build()).motion.poses
@@ -230,6 +253,15 @@ def track_multiview(path: Path) -> Iterator[Tracked]:
         some = next(row for row in rows if row is not None)
         components = {name: np.array([np.zeros((len(names), 3)) if row is None else row[name] for row in rows]) for name in some}
         yield Tracked(path.name, fault, names, components, errors, np.empty((0, 2)))
+
+
+def across(path: Path) -> tuple[str, str]:
+    """The two cameras of a recording whose views of the person are nearest to a right angle."""
+    rig, truth = open_rig(path, make_options({})), read_joints(path / "truth.csv")
+    rays = unit(np.array([camera.centre for camera in rig.cameras]) - truth.positions[0].mean(0))
+    pairs = list(combinations(range(len(rays)), 2))
+    first, second = min(pairs, key=lambda pair: abs(float(rays[pair[0]] @ rays[pair[1]])))
+    return rig.names[first], rig.names[second]
 
 
 def make_ring(path: Path) -> None:
@@ -263,9 +295,12 @@ def collect(kind: str, path: Path, build: Path, again: bool, clean: bool = False
     return sorted(folder.glob("*.npz"))
 
 
-TRACK = {"monocular": track_monocular, "multiview": track_multiview}
-MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND),
-                                             "multiview": lambda: [RINGS / spec.name for spec in proving_rings()]}
+def _rings() -> list[Path]:
+    return [RINGS / spec.name for spec in proving_rings()]
+
+
+TRACK = {"monocular": track_monocular, "multiview": track_multiview, **{kind: partial(track_multiview, kind=kind) for kind in SIGHTINGS}}
+MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND), **dict.fromkeys(("multiview", *SIGHTINGS), _rings)}
 
 
 def read_runs(files: Iterable[Path]) -> list[Tracked]:

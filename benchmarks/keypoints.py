@@ -1,4 +1,4 @@
-"""What a detector's keypoints bring: joint errors by silhouettes alone, with keypoints too, and of the same keypoints triangulated alone.
+"""What a detector's keypoints bring: joint errors by silhouettes, by keypoints, by both, and of the same keypoints triangulated alone.
 
     python benchmarks/keypoints.py [FILM...] [--detector made] [--seeds 1] [-o build/keypoints]
 
@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 import smallest
-from detector import detected
+from detector import DETECTORS, detected
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.keypoints.film_keypoints import film_keypoints, write_keypoints
@@ -37,7 +37,8 @@ from shadowpuppet.tracking.smoothing.butterworth import filtered
 ROOT = Path(__file__).resolve().parent.parent
 JOINTS = tuple(f"{side}_{name}" for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right"))
 LOST_MM, CUTOFF = 500.0, 6.0
-ROWS = ("triangulated", "silhouettes", "both")
+ROWS = {"triangulated": None, "silhouettes": "silhouettes", "keypoints": "keypoints", "both": "silhouettes,keypoints"}
+"""The evidence of each row's runs; None: none is tracked."""
 
 
 def films(rings: bool = False) -> Iterator[Spec]:
@@ -57,25 +58,27 @@ def films(rings: bool = False) -> Iterator[Spec]:
     yield replace(named_specs()["rings_sits_on_new"], name="new_chair", tells="nothing")
 
 
-def with_keypoints(recording: Path, detector: str, seed: int) -> Path:
-    """A recording with keypoints in it: `made` ones, or those that `shadowpuppet keypoints` finds beside it."""
-    if detector != "made":
-        found = recording.with_name(f"{recording.name}-{detector}")
-        if not (found / "keypoints").is_dir():
-            command = [sys.executable, "-m", "shadowpuppet", "keypoints", recording, "-o", found, "--with", detector, "--quiet"]
-            subprocess.run(list(map(str, command)), check=True)
+def with_keypoints(recording: Path, detector: str, seed: int = 0) -> Path:
+    """A copy of a recording beside it, with keypoints: of one of `detector.DETECTORS`, or those that `shadowpuppet keypoints` finds."""
+    found = recording.with_name(f"{recording.name}-{detector}{seed or ''}")
+    if (found / "keypoints").is_dir():
         return found
-    truth, rig = read_joints(recording / "truth.csv"), open_rig(recording, make_options({}))
+    if detector not in DETECTORS:
+        command = [sys.executable, "-m", "shadowpuppet", "keypoints", recording, "-o", found, "--with", detector, "--quiet"]
+        subprocess.run(list(map(str, command)), check=True)
+        return found
+    shutil.copytree(recording, found, dirs_exist_ok=True, ignore=shutil.ignore_patterns("keypoints"))
+    truth, rig = read_joints(recording / "truth.csv"), open_rig(recording, make_options({"evidence": "silhouettes"}))
     columns = [truth.names.index(name) for name in JOINTS]
     cameras = [footage.view.camera for footage in rig.footage]
-    found = detected(np.random.default_rng([51, seed]), cameras, truth.times, JOINTS, truth.positions[:, columns])
-    frames = np.arange(len(found))
+    made = detected(np.random.default_rng([51, seed]), cameras, truth.times, JOINTS, truth.positions[:, columns], DETECTORS[detector])
+    frames = np.arange(len(made))
+    (found / "keypoints").mkdir()
     for n, footage in enumerate(rig.footage):
-        xy, sure = (np.array([getattr(of[n], what)[0] for of in found]) for what in ("xy", "confidence"))
-        film = film_keypoints(JOINTS, frames, 0 * frames, xy, sure, "made", footage.view.camera.size)
-        (recording / "keypoints").mkdir(exist_ok=True)
-        write_keypoints(recording / "keypoints" / f"{footage.view.camera.name}.npz", film)
-    return recording
+        xy, sure = (np.array([getattr(of[n], what)[0] for of in made]) for what in ("xy", "confidence"))
+        film = film_keypoints(JOINTS, frames, 0 * frames, xy, sure, detector, footage.view.camera.size)
+        write_keypoints(found / "keypoints" / f"{footage.view.camera.name}.npz", film)
+    return found
 
 
 def by_triangulation(rig: Rig, times: Array) -> JointTable:
@@ -109,12 +112,14 @@ def measured(recording: Path, out: Path, seeds: int, detector: str) -> dict[str,
     truth = read_joints(recording / "truth.csv")
     for seed in range(seeds):
         known = with_keypoints(recording, detector, seed)
-        for row, evidence in (("silhouettes", "silhouettes"), ("both", "silhouettes,keypoints")):
+        for row, evidence in ROWS.items():
+            if evidence is None:
+                continue
             run = track_recording(known, out / f"{recording.name}-{row}-{seed}", make_options({"seed": seed, "evidence": evidence}))
             spent = run.metrics["ms_per_frame"]
             values[row].append((error(run.motion.table, truth), spent["track"] + spent["hull"]))
-        found = by_triangulation(open_rig(known, make_options({})), run.motion.times)
-        values["triangulated"].append((error(found, truth), np.nan))
+        rig = open_rig(known, make_options({}))
+        values["triangulated"].append((error(by_triangulation(rig, np.arange(rig.count or 0) / rig.rate), truth), np.nan))
     return {row: tuple(np.mean(some, axis=0).tolist()) for row, some in values.items()}
 
 
@@ -133,7 +138,8 @@ def main() -> None:
     parser.add_argument("-o", "--out", type=Path, default=ROOT / "build" / "keypoints")
     args = smallest.parse(parser, _smallest)
     specs = {spec.name: spec for spec in films(args.rings)}
-    print("| film | " + " | ".join(ROWS) + " | ms, silhouettes | ms, both |\n" + "|---" * 6 + "|")
+    head = ["film", *ROWS, *(f"ms, {row}" for row, evidence in ROWS.items() if evidence)]
+    print("| " + " | ".join(head) + " |\n" + "|---" * len(head) + "|")
     for name in args.films or specs:
         recording = args.out / name if name in specs else Path(name)
         with warnings.catch_warnings():
@@ -142,7 +148,7 @@ def main() -> None:
                 shutil.rmtree(recording, ignore_errors=True)
                 synthesize(specs[name], recording)
             rows = measured(recording, args.out / "runs", args.seeds, args.detector)
-        cells = [f"{rows[row][0]:.1f}" for row in ROWS] + [f"{rows[row][1]:.0f}" for row in ROWS[1:]]
+        cells = [f"{rows[row][0]:.1f}" for row in ROWS] + [f"{rows[row][1]:.0f}" for row, evidence in ROWS.items() if evidence]
         print(f"| {recording.name} | " + " | ".join(cells) + " |", flush=True)
 
 

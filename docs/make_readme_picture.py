@@ -19,7 +19,7 @@ from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.drawing import draw_model, draw_skeleton, write_text
+from shadowpuppet.camera.drawing import draw_model, draw_skeleton
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.calibration_files import read_calibration
@@ -153,7 +153,8 @@ def frame(seen: Seen, hull: VisualHull, n: int) -> np.ndarray:
     films, shadows = tiles(seen, n)
     parts = [*(beside([stacked(each[:2]), stacked(each[2:])]) for each in (films, shadows)), puppet(seen, hull, n)]
     for part, what in zip(parts, ("films", "silhouettes", "puppet")):
-        write_text(part, what, part.shape[0] - 24 * FINER, (255, 255, 255), size=300 * FINER)
+        for ink, thickness in (((0, 0, 0), 3 * FINER), ((255, 255, 255), FINER)):
+            cv2.putText(part, what, (6 * FINER, len(part) - 8 * FINER), cv2.FONT_HERSHEY_SIMPLEX, 0.5 * FINER, ink, thickness, cv2.LINE_AA)
     whole = beside(parts)
     return cv2.resize(whole, (whole.shape[1] // FINER, whole.shape[0] // FINER), interpolation=cv2.INTER_AREA)
 

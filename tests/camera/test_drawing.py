@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,7 +16,8 @@ from shadowpuppet.body.upper_body import CardboxSizes
 from shadowpuppet.camera import drawing
 from shadowpuppet.camera.bits import unpack
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.drawing import PALE, SIDE_COLOURS, draw_model, draw_skeleton, matching, overlay_frame
+from shadowpuppet.camera.drawing import draw_keypoints, draw_model, draw_person, draw_skeleton, matching, overlay_frame
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, rigid
@@ -26,8 +28,6 @@ SIZES = CardboxSizes(*(1.8 * share for share in (
 CAMERA = Camera("cam", (160, 120), [[138, 0, 79.5], [0, 138, 59.5], [0, 0, 1]], T_camera_world=rigid(np.eye(3), [0.1, 0.2, 0.3]))
 AXES = [[0, 1, 0], [0, 0, -1], [-1, 0, 0]]
 """X toward the camera, Y to the image's right, Z up."""
-LABEL = 20
-"""Rows that a label may take."""
 
 
 def a_picture(distance: float = 2.0, body: str = "cardbox") -> Picture:
@@ -59,22 +59,11 @@ def test_the_middle_row_is_the_cost_in_colours(rng):
     ignore[100:] = True
     pose = a_pose(picture)
     model = picture.mask(pose)
-    middle = rows(overlay_frame(image, mask, picture, pose, status="tracked", time=1.0, ignore=ignore))[1][LABEL:]
-    model, mask, ignore = model[LABEL:], mask[LABEL:], ignore[LABEL:]
+    middle = rows(overlay_frame(image, mask, picture, pose, ignore=ignore))[1]
     for colour, where in {drawing.MODEL_ONLY: model & ~mask, drawing.SILHOUETTE_ONLY: ~model & mask, drawing.WHITE: model & mask,
                           drawing.BLACK: ~model & ~mask}.items():
         np.testing.assert_array_equal((middle == colour).all(2), where & ~ignore)
         assert where.any()
-
-
-def test_words_beside_each_other_are_lines_of_text_that_go_on_where_the_last_one_ended():
-    both = np.zeros((2, 60, 300, 3), np.uint8)
-    words = [("left", drawing.WHITE), ("right of it", (10, 200, 30))]
-    drawing.write_words(both[0], 7, words, 240)
-    end = drawing.write_text(both[1], "left", 7, drawing.WHITE, size=240)
-    assert both[1].any((0, 2)).nonzero()[0].max() < end
-    drawing.write_text(both[1], "right of it", 7, (10, 200, 30), end, 240)
-    np.testing.assert_array_equal(*both)
 
 
 @given(st.integers(0, 2**36 - 1))
@@ -122,7 +111,7 @@ def test_the_skeleton_is_drawn_over_the_raw_picture(rng):
     picture = a_picture()
     image, mask = a_scene(rng, picture)
     pose = a_pose(picture)
-    bottom = rows(overlay_frame(image, mask, picture, pose, status="tracked", time=0.0))[2]
+    bottom = rows(overlay_frame(image, mask, picture, pose))[2]
     points = picture.body.points(pose[None], picture.T_camera_base)[0]
     near = np.zeros(mask.shape, bool)
     for name, point in zip(picture.body.landmark_names, points):
@@ -130,27 +119,48 @@ def test_the_skeleton_is_drawn_over_the_raw_picture(rng):
         if name.endswith(("elbow", "wrist")):
             assert tuple(bottom[y, x]) == drawing.WHITE
         near[max(y - 40, 0) : y + 41, max(x - 40, 0) : x + 41] = True
-    near[:LABEL] = True
     np.testing.assert_array_equal(bottom[~near], image[~near])
 
 
+def test_the_picture_is_seen_through_the_body_and_the_bones_are_over_it(rng):
+    picture = replace(a_picture(), camera=CAMERA.resized((320, 240)))
+    image, pose = rng.integers(0, 256, (240, 320, 3), np.uint8), a_pose(picture)
+    both, bones = image.copy(), image.copy()
+    draw_person(both, picture, pose)
+    draw_skeleton(bones, picture, pose)
+    drawn = (bones != image).any(2)
+    for colour in (drawing.WHITE, drawing.BLACK, *drawing.SIDE_COLOURS.values()):  # all but smooth edges
+        there = drawn & (bones == colour).all(2)
+        assert there.sum() > 20
+        np.testing.assert_array_equal(both[there], bones[there])
+    body = picture.mask(pose) & ~drawn
+    assert np.corrcoef(both[body].ravel(), image[body].ravel())[0, 1] > 0.5  # nothing is seen through an opaque one
+    assert (both[body] != image[body]).any(1).mean() > 0.95
+
+
 @pytest.mark.parametrize("body", BODIES)
-def test_doubtful_parts_are_pale_and_the_others_as_before(body):
-    picture = a_picture(body=body)
+def test_doubtful_parts_are_dashed_outlines_and_the_others_as_before(body):
+    """The outline of a doubtful limb has gaps, and what is behind it is seen."""
+    picture = replace(a_picture(body=body), camera=CAMERA.resized((640, 480)))
     pose, images = a_pose(picture), []
     arm = [part for part in picture.body.parts if part.startswith("left_")]
     for doubtful in ([], arm):
-        images.append(np.zeros((120, 160, 3), np.uint8))
+        images.append(np.full((480, 640, 3), 30, np.uint8))
         draw_model(images[-1], picture, pose, doubtful)
-    changed = (images[0] != images[1]).any(2)
-    limb = unpack(picture.draw(pose, shapes_of(picture.body, *set(arm))), 160)
-    assert changed[limb].mean() > 0.5
-    assert not changed[:, 80:][~limb[:, 80:]].any() or not changed[:, :80][~limb[:, :80]].any()
-    saturation = [np.ptp(image[limb & changed].astype(int), axis=1).mean() for image in images]
-    assert saturation[1] < 0.5 * saturation[0]
+    whole, dashed = ((image != 30).any(2) for image in images)
+    limb = unpack(picture.draw(pose, shapes_of(picture.body, *set(arm))), 640)
+    others = unpack(picture.draw(pose, shapes_of(picture.body, *set(picture.body.parts) - set(arm))), 640)
+    near = cv2.dilate((limb | (whole & ~others)).view(np.uint8), np.ones((9, 9))) > 0
+    np.testing.assert_array_equal(images[0][~near], images[1][~near])
+    alone = limb & ~(cv2.dilate(others.view(np.uint8), np.ones((7, 7))) > 0)
+    assert whole[alone].mean() > 0.99
+    assert 0.01 < dashed[alone].mean() < 0.5
+    hue = np.array(drawing.SIDE_COLOURS["left"]) / np.linalg.norm(drawing.SIDE_COLOURS["left"])
+    lines = (images[1][dashed & alone] - 30.0).clip(0)
+    assert ((lines @ hue) > 0.8 * np.linalg.norm(lines, axis=1)).mean() > 0.9  # of the side's colour
 
 
-def test_bones_to_doubtful_landmarks_are_dashed_and_pale():
+def test_bones_to_doubtful_landmarks_are_dashed():
     picture = replace(a_picture(distance=1.5), camera=CAMERA.resized((640, 480)))
     pose, images = a_pose(picture), []
     for doubtful in ((), ("left_elbow", "left_wrist")):
@@ -168,75 +178,71 @@ def test_bones_to_doubtful_landmarks_are_dashed_and_pale():
 
 def test_a_dashed_bone_that_leads_far_away_takes_no_time():
     image = np.zeros((60, 80, 3), np.uint8)
-    drawing.draw_bone(image, np.array([40.0, 30.0]), np.array([1e9, 30.0]), drawing.WHITE, 2, True)
+    drawing.draw_line(image, np.array([[40.0, 30.0], [1e9, 30.0]]), drawing.WHITE, 2, 9)
     assert image[30, 40:].any(1).all()
 
 
 def test_without_a_pose_nothing_is_drawn(rng):
     picture = a_picture()
     image, mask = a_scene(rng, picture)
-    top, middle, bottom = rows(overlay_frame(image, mask, picture, np.full(12, np.nan), status="absent", time=3.5))
-    np.testing.assert_array_equal(bottom[LABEL:], image[LABEL:])
-    np.testing.assert_array_equal(middle[LABEL:], matching(np.zeros_like(mask), mask)[LABEL:])
-    assert (top[LABEL:] <= image[LABEL:].max() * 0.41).all()
+    top, middle, bottom = rows(overlay_frame(image, mask, picture, np.full(12, np.nan)))
+    np.testing.assert_array_equal(bottom, image)
+    np.testing.assert_array_equal(middle, matching(np.zeros_like(mask), mask))
+    assert (top <= image.max() * 0.41).all()
 
 
-def test_without_a_pose_the_last_one_is_drawn_pale_with_its_time(rng):
+def test_without_a_pose_the_last_one_is_drawn_dashed(rng):
     picture = a_picture()
     image, mask = a_scene(rng, picture)
-    lost = {"status": "lost", "time": 3.5}
-    top, middle, bottom = rows(overlay_frame(image, mask, picture, np.full(12, np.nan), **lost, last=(a_pose(picture), 3.0)))
-    without = rows(overlay_frame(image, mask, picture, np.full(12, np.nan), **lost))
+    top, middle, bottom = rows(overlay_frame(image, mask, picture, np.full(12, np.nan), last=a_pose(picture)))
+    without = rows(overlay_frame(image, mask, picture, np.full(12, np.nan)))
     np.testing.assert_array_equal(top, without[0])
     np.testing.assert_array_equal(middle, without[1])
-    assert (bottom[LABEL:] != without[2][LABEL:]).any()
-    assert (bottom[:LABEL] != without[2][:LABEL]).any()
-    followed = rows(overlay_frame(image, mask, picture, a_pose(picture), **lost))[2]
-    assert (bottom[LABEL:] != followed[LABEL:]).any()  # pale and dashed
+    doubted = rows(overlay_frame(image, mask, picture, a_pose(picture), doubtful=picture.body.landmark_names))[2]
+    np.testing.assert_array_equal(bottom, doubted)
+    assert (doubted != rows(overlay_frame(image, mask, picture, a_pose(picture)))[2]).any()
 
 
-def test_the_colours_are_explained(rng):
+def keypoints(*points: tuple[str, float, float, float]) -> Keypoints:
+    """One person's landmarks: name, x, y, confidence."""
+    names, x, y, sure = zip(*points)
+    return Keypoints(names, np.array([np.stack([x, y], 1)]), np.array([sure]), np.array([-1]), "HALPE_26")
+
+
+@pytest.mark.parametrize("size", [(320, 240), (640, 480)])
+def test_keypoints_are_thin_crosses_of_their_side_faint_by_confidence(size):
+    image = np.full((*size[::-1], 3), 90, np.uint8)
+    points = [("left_wrist", 60, 80, 1.0), ("right_wrist", 140.4, 80, 1.0), ("left_knee", 60, 160, 0.3), ("nose", 140, 160, 1.0),
+              ("left_hip", np.nan, np.nan, 0.0), ("right_hip", 0, size[1] - 1, 1.0)]
+    draw_keypoints(image, keypoints(*points))
+    for name, x, y, sure in points[:4]:
+        own, bare = image[round(y) - 3, round(x)].astype(int), np.array([90, 90, 90])
+        light = (np.array(drawing.colour_of(name)) + 255) / 2
+        np.testing.assert_allclose(own, sure * light + (1 - sure) * bare, atol=2)
+        np.testing.assert_array_equal(image[round(y) - 3, round(x) + 3], bare)  # thin
+        np.testing.assert_array_equal(image[round(y), round(x) + 2], own)
+    around = (image != 90).any(2)
+    assert around.sum() < 0.02 * around.size
+    assert around[-1, 0], "at the picture's corner, too"
+
+
+def test_crosses_are_in_the_upper_and_the_lower_row(rng):
     picture = a_picture()
     image, mask = a_scene(rng, picture)
-    top, middle, _ = rows(overlay_frame(image * 0, mask & False, picture, np.full(12, np.nan), status="lost", time=3.5))
-    for colour in (*SIDE_COLOURS.values(), PALE):
-        assert (np.abs(top[:LABEL].astype(int) - colour).max(2) < 12).any(), colour
-    assert (middle[:LABEL].min(2) > 240).any()
-
-
-def test_status_time_and_overlap_are_written(rng):
-    picture = a_picture()
-    image, mask = a_scene(rng, picture)
-    pose = a_pose(picture)
-    said = {"status": "tracked", "time": 1.0, "overlap": 0.9}
-    frames = [overlay_frame(image, mask, picture, pose, **said | change)
-              for change in ({}, {"status": "lost"}, {"time": 1.5}, {"overlap": 0.8}, {"overlap": np.nan})]
-    assert len({frame.tobytes() for frame in frames}) == len(frames)
-    for frame in frames:
-        np.testing.assert_array_equal(frame[2 * 120 + LABEL :], frames[0][2 * 120 + LABEL :])
-        np.testing.assert_array_equal(frame[: 2 * 120], frames[0][: 2 * 120])
-
-
-def test_a_long_caption_takes_several_lines_and_none_is_cut_off():
-    said = "12.34 s  tracked, trunk, both arms, both legs doubtful  IoU 0.81"
-    for width, most in ((320, 2), (160, 4), (1200, 1)):
-        out = np.full((3 * 240, width, 3), 128, np.uint8)
-        lines = drawing.lines_below(out, said, 480)
-        assert " ".join(line for _, line in lines) == said
-        assert 1 <= len(lines) <= most
-        for top, line in lines:
-            assert drawing.write_text(out, line, top, drawing.WHITE) <= width + 10
-        inked = np.flatnonzero((out[480:] != 128).any((1, 2)))
-        assert len(inked) >= 8 * len(lines)
-        assert (out[:, -1] == 128).all()
+    found = keypoints(("nose", 30, 30, 0.9), ("left_wrist", 100, 60, 0.5))
+    with_them, without = (rows(overlay_frame(image, mask, picture, a_pose(picture), keypoints=each)) for each in (found, None))
+    np.testing.assert_array_equal(with_them[1], without[1])
+    for row in (0, 2):
+        changed = np.argwhere((with_them[row] != without[row]).any(2))
+        assert {bool(np.abs(changed - (y, x)).max(1).min() == 0) for x, y in ((30, 27), (100, 57))} == {True}
+        assert np.minimum(*(np.abs(changed - (y, x)).max(1) for x, y in ((30, 30), (100, 60)))).max() <= 5
 
 
 def test_grey_pictures_do(rng):
     picture = a_picture()
     image, mask = a_scene(rng, picture)
     grey = image[..., 0]
-    a, b = (overlay_frame(i, mask.astype(np.uint8) * 255, picture, a_pose(picture), status="tracked", time=0.0)
-            for i in (grey, np.stack([grey] * 3, 2)))
+    a, b = (overlay_frame(i, mask.astype(np.uint8) * 255, picture, a_pose(picture)) for i in (grey, np.stack([grey] * 3, 2)))
     np.testing.assert_array_equal(a, b)
 
 
@@ -246,10 +252,9 @@ def test_any_pose_at_any_distance_is_drawn(seed, distance, body):
     """Across the image's border, close to the camera and behind it."""
     picture = a_picture(distance, body)
     pose = np.random.default_rng(seed).normal(size=12) * 2
-    frame = overlay_frame(np.zeros((120, 160), np.uint8), np.zeros((120, 160), bool), picture, pose, status="tracked", time=0.0)
+    frame = overlay_frame(np.zeros((120, 160), np.uint8), np.zeros((120, 160), bool), picture, pose)
     assert frame.shape == (360, 160, 3)
-    middle = rows(frame)[1][LABEL:]
-    np.testing.assert_array_equal((middle == drawing.MODEL_ONLY).all(2), picture.mask(pose)[LABEL:])
+    np.testing.assert_array_equal((rows(frame)[1] == drawing.MODEL_ONLY).all(2), picture.mask(pose))
 
 
 def test_pixels_far_outside_stay_far_outside_in_fixed_point_numbers():
@@ -268,7 +273,7 @@ def test_a_picture_of_another_size_is_said(shapes, said):
     picture = a_picture()
     image, mask, ignore = (np.zeros(shape, np.uint8) for shape in shapes)
     with pytest.raises(ShadowPuppetError, match=said):
-        overlay_frame(image, mask, picture, a_pose(picture), status="tracked", time=0.0, ignore=ignore)
+        overlay_frame(image, mask, picture, a_pose(picture), ignore=ignore)
 
 
 def test_a_film_of_overlays(tmp_path, rng):
@@ -277,10 +282,10 @@ def test_a_film_of_overlays(tmp_path, rng):
     with write_frames(tmp_path / "overlay.mp4", 15) as film:
         for i in range(4):
             pose = a_pose(picture, torso_bend=0.1 * i)
-            film.write(overlay_frame(image, mask, picture, pose, status="tracked", time=i / 15, overlap=0.9))
+            film.write(overlay_frame(image, mask, picture, pose))
     frames = list(open_frames(tmp_path / "overlay.mp4"))
     assert [round(frame.time * 15) for frame in frames] == [0, 1, 2, 3]
     assert frames[0].image.shape == (360, 160, 3)
-    middle = rows(frames[0].image)[1][LABEL:].astype(int)
-    white = (picture.mask(a_pose(picture)) & mask)[LABEL:]
+    middle = rows(frames[0].image)[1].astype(int)
+    white = picture.mask(a_pose(picture)) & mask
     assert middle[white].mean() > 220

@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 import tomllib
+import warnings
 from dataclasses import is_dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,7 +29,8 @@ from waiting import until
 from shadowpuppet import jit
 from shadowpuppet.cli import app as cli
 from shadowpuppet.cli import terminal as terminal_module
-from shadowpuppet.errors import PERSON_LOST
+from shadowpuppet.cli import track as track_module
+from shadowpuppet.errors import PERSON_LOST, ShadowPuppetWarning
 from shadowpuppet.io.run import read_run
 from shadowpuppet.live.settings import LiveSettings
 from shadowpuppet.live.stream.settings import OutletSettings
@@ -242,7 +244,7 @@ def test_a_line_of_progress_does_not_fall_into_what_is_printed_next():
     assert printed == ["... looking"]
 
 
-def test_compiling_is_said_while_it_lasts(capsys, monkeypatch):
+def test_compiling_is_said_once(capsys, monkeypatch):
     monkeypatch.setattr(terminal_module, "LOG_EVERY", 0.02)
     monkeypatch.setattr(terminal_module, "monotonic", functools.partial(next, itertools.count(0, 0.001)))
     with terminal_module.terminal() as listener:
@@ -251,7 +253,10 @@ def test_compiling_is_said_while_it_lasts(capsys, monkeypatch):
         with event.trigger_event("numba:compile", data={}):
             assert jit.is_compiling()
             lines += printed_until(capsys, "(a minute or two)")
+            listener.begin("tracking")
+            later = [line for _ in range(2) for line in printed_until(capsys, "... tracking")]
         assert not jit.is_compiling()
+    assert not any("compiling" in line for line in later)
     assert not lines[0].endswith("(a minute or two)")
     assert lines[-1] == "... measuring the person, 0 s, compiling, once (a minute or two)"
 
@@ -263,6 +268,33 @@ def test_what_a_message_quotes_is_printed_as_it_is(capsys):
         listener.trouble("no pictures from [/dev/video0]")
     lines = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("...")]
     assert lines == ["reading [red]films[/red] of [bold]", "warning: camera '[dim]' is late", "warning: no pictures from [/dev/video0]"]
+
+
+def test_warnings_about_the_program_s_own_code_are_for_those_who_ask(capsys):
+    for verbose in (False, True):
+        with terminal_module.terminal(verbose=verbose):
+            for category, text in ((RuntimeWarning, "overflow encountered in cast"), (ShadowPuppetWarning, "the film breaks off")):
+                with warnings.catch_warnings():
+                    warnings.simplefilter("always", category)
+                    warnings.warn(text, category, stacklevel=1)
+        said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning")]
+        assert said[-1] == "warning: the film breaks off"
+        assert [re.sub(r"\d+", "N", line) for line in said[:-1]] == (
+            ["warning: RuntimeWarning in test_app.py:N: overflow encountered in cast"] if verbose else [])
+
+
+def test_a_run_that_had_all_its_frames_before_has_no_speed(capsys, run):
+    metrics = read_run(run).metrics
+    for frames_per_s, said in ((metrics["frames_per_s"], True), (0.0, False)):
+        track_module._show_run(run, metrics | {"frames_per_s": frames_per_s})
+        assert ("frames/s" in capsys.readouterr().out) == said
+
+
+def test_the_help_of_view_is_about_viewing(shell):
+    found = shell("view", "--help").out
+    assert "--html" in found
+    for of_tracking in ("--anyway", "--seed", "--smooth", "--overlay"):
+        assert of_tracking not in found
 
 
 def test_info_looks_and_leaves_nothing(shell, recording, tmp_path):

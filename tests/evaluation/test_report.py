@@ -245,7 +245,8 @@ def test_a_curve_of_many_frames_is_drawn_as_means_of_neighbours():
 def test_frames_of_a_camera_s_overlay_are_shown_side_by_side_with_the_truth(tmp_path, quick):
     run = run_that_errs(tmp_path)
     write_calibration(run / "calibration.toml", [camera()])
-    grey = [np.full((3 * SIZE[1], SIZE[0], 3), 40 + 2 * n, np.uint8) for n in range(len(TRUTH.times))]
+    grey = [np.concatenate([np.full((3 * SIZE[1], SIZE[0], 3), 40 + 2 * n, np.uint8), np.full((70, SIZE[0], 3), 255, np.uint8)])
+            for n in range(len(TRUTH.times))]  # fmt: skip
     write_film(run / "overlay.mp4", grey, 15, lossless=False)
     of = measure_run(run)
     text = page(of)
@@ -266,8 +267,9 @@ def test_of_several_cameras_overlay_the_person_is_cut_out(tmp_path):
     cameras = [camera(f"cam{n}", 0.8 * n) for n in range(7)]
     run = run_that_errs(tmp_path)
     write_calibration(run / "calibration.toml", cameras)
-    columns, rows, (width, height) = grid_of([each.size for each in cameras])
-    grids = [np.full((rows * height, columns * width, 3), 40 + 2 * n, np.uint8) for n in range(len(TRUTH.times))]
+    grid = grid_of(cameras)
+    size = grid.rows * (grid.header + grid.height) + 60, grid.columns * grid.width, 3  # with a strip of words
+    grids = [np.full(size, 40 + 2 * n, np.uint8) for n in range(len(TRUTH.times))]
     write_film(run / "overlay.mp4", grids, 15)
     of = measure_run(run)
     shots, source = pictures(of, report_frames(of))

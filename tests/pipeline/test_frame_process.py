@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 import threading
+import warnings
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +17,11 @@ import pytest
 from solids import looking
 from waiting import LONG
 
-from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, TrackingError
+from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, TrackingError, warn
 from shadowpuppet.io.recording import Recording, View
 from shadowpuppet.pipeline import frame_process
 from shadowpuppet.pipeline.footage import Footage
-from shadowpuppet.pipeline.frame_process import Task, frames_beside
+from shadowpuppet.pipeline.frame_process import Task, _taken, frames_beside
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
@@ -100,6 +101,19 @@ def test_its_warnings_are_ours(tmp_path, started):
         assert len(list(frames_beside(task(tmp_path, (12, 4, 12))))) == 12
     assert len(caught) == 1
     assert caught[0].filename == __file__
+
+
+def test_warnings_of_libraries_stay_theirs():
+    """Else a user is told of them as of a problem of the films."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        warnings.warn("overflow encountered in cast", RuntimeWarning, stacklevel=1)
+        warn("the film breaks off")
+        taken = _taken(caught)
+    sent = pickle.loads(pickle.dumps(taken))
+    assert [(str(each), type(each)) for each in sent] == [("overflow encountered in cast", RuntimeWarning),
+                                                          ("the film breaks off", ShadowPuppetWarning)]
+    assert caught == []
 
 
 def test_its_errors_are_ours(tmp_path, started):

@@ -1,25 +1,27 @@
-"""The overlay of several cameras: the model where it is, pale where it was, and the films around it as they are."""
+"""The overlay of several cameras: the model where it is, dashed where it was, and the films around it as they are."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import made_rig
 import numpy as np
 import pytest
 import runs
 
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Seen
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.motion.limbs import LIMBS
 from shadowpuppet.motion.motion import MotionFrame
-from shadowpuppet.pipeline.overlay_video import TALLEST, WIDEST, grid_of, overlay_grid
+from shadowpuppet.pipeline.overlay_video import TALLEST, WIDEST, grid_of, overlay_grid, overlay_of_people
 from shadowpuppet.pipeline.rig import FrameSet
 
 SIZE = (320, 240)
 CAMERAS = made_rig.cameras(4, SIZE)
 BODY = runs.body_of("anatomical")
 PICTURES = [Picture(BODY, camera, camera.T_camera_world) for camera in CAMERAS]
-WORDS = 70
-"""Rows at the lower end that words may take."""
+GRID = grid_of(CAMERAS)
 
 
 def frame(status: str = "tracked", limbs: str = "tracked", time: float = 1.0, **angles: float) -> MotionFrame:
@@ -39,13 +41,12 @@ def films(without: int | None = None) -> FrameSet:
 
 
 def shown(found: MotionFrame, last: MotionFrame | None = None, without: int | None = None) -> np.ndarray:
-    """Without the words."""
     out = overlay_grid(films(without), found, PICTURES, last)
-    assert out.shape == (2 * SIZE[1], 2 * SIZE[0], 3)
-    return out[:-WORDS]
+    assert out.shape == (2 * (SIZE[1] + GRID.header), 2 * SIZE[0], 3)
+    return out
 
 
-def test_a_pose_is_drawn_whatever_was_before_and_where_there_is_none_the_last_one_all_pale():
+def test_a_pose_is_drawn_whatever_was_before_and_where_there_is_none_the_last_one_all_dashed():
     last = frame(limbs="tracked", left_shoulder_x=1.2)
     np.testing.assert_array_equal(shown(frame(), last), shown(frame()))
     for status in ("lost", "absent"):
@@ -57,28 +58,63 @@ def test_nothing_but_the_model_is_drawn_into_the_films():
     bare, found = shown(frame("lost")), frame()
     changed = (shown(found) != bare).any(2)
     for n, picture in enumerate(PICTURES):
-        y, x = divmod(n, 2)
-        rows = slice(y * SIZE[1], min((y + 1) * SIZE[1], len(changed)))
-        drawn, mask = changed[rows, x * SIZE[0] : (x + 1) * SIZE[0]], picture.mask(np.asarray(found.pose))[: rows.stop - rows.start]
+        drawn, mask = changed[GRID.place(n)], picture.mask(np.asarray(found.pose))
         assert (drawn & mask).sum() > 0.95 * mask.sum() > 1000
         assert (drawn & ~mask).sum() < 0.3 * mask.sum()  # outlines
         image = films().images[n]
         assert image is not None
-        plain = bare[rows, x * SIZE[0] : (x + 1) * SIZE[0]][40:190]
-        np.testing.assert_array_equal(plain, image[40:190][: len(plain)])
+        np.testing.assert_array_equal(bare[GRID.place(n)][:190], image[:190])
 
 
-def test_a_camera_without_a_picture_is_black_but_for_words():
+def test_each_camera_has_its_name_above_its_picture_and_none_over_it():
+    plain = shown(frame("lost"))
+    other = overlay_grid(films(), frame("lost"), [replace(each, camera=replace(each.camera, name=f"door {n}"))
+                                                  for n, each in enumerate(PICTURES)])
+    for n in range(4):
+        rows, columns = GRID.place(n)
+        np.testing.assert_array_equal(other[rows, columns], plain[rows, columns])
+        assert (other[rows.start - GRID.header : rows.start, columns] != plain[rows.start - GRID.header : rows.start, columns]).any()
+
+
+def test_a_camera_without_a_picture_is_grey_under_its_name():
     whole, out = shown(frame()), shown(frame(), without=1)
+    rows, columns = GRID.place(1)
     np.testing.assert_array_equal(out[:, : SIZE[0]], whole[:, : SIZE[0]])
-    assert not out[40 : SIZE[1], SIZE[0] :].any()
-    assert out[:40, SIZE[0] :].any()
+    assert len(np.unique(out[rows, columns])) == 1
+    np.testing.assert_array_equal(out[: rows.start], whole[: rows.start])
+
+
+def test_a_doubtful_limb_is_dashed_with_several_people_too():
+    limbs = ["uncertain" if limb == "left_arm" else "tracked" for limb in LIMBS]
+    both = [frame(), frame()._replace(limb_status=limbs)]
+    sure, doubted = (overlay_of_people(films(), CAMERAS, [(2, found, PICTURES)]) for found in both)
+    changed = (sure != doubted).any(2)
+    for n, picture in enumerate(PICTURES):
+        arm = picture.mask(np.asarray(both[0].pose)) & changed[GRID.place(n)]
+        assert 60 < arm.sum() < 0.5 * picture.mask(np.asarray(both[0].pose)).sum()
+    alone = overlay_grid(films(), both[1], PICTURES)
+    number = (alone != doubted).any(2)
+    assert number.any()
+    for n, picture in enumerate(PICTURES):  # the number is above the head
+        mask = picture.mask(np.asarray(both[0].pose))
+        assert not number[GRID.place(n)][np.nonzero(mask)[0].min() + 2 :].any()
+
+
+def test_keypoints_are_drawn_into_their_cameras_picture():
+    point = Keypoints(("left_wrist",), np.array([[[200.0, 50.0]]]), np.ones((1, 1)), np.array([-1]), "HALPE_26")
+    now = films()
+    seen = now.seen._replace(keypoints=(None, point, None, None))
+    plain, crossed = (overlay_grid(each, frame("lost"), PICTURES) for each in (now, now._replace(seen=seen)))
+    changed = np.argwhere((plain != crossed).any(2))
+    rows, columns = GRID.place(1)
+    assert 10 < len(changed) < 40
+    assert np.abs(changed - (rows.start + 50, columns.start + 200)).max() <= 5
 
 
 @pytest.mark.parametrize("sizes", [[(640, 480)] * 7, [(1080, 1920)] * 4, [(640, 480)] * 2, [(320, 240), (640, 360), (480, 640)]])
 def test_a_grid_holds_all_cameras_and_is_of_a_reasonable_size(sizes):
-    columns, rows, (width, height) = grid_of(sizes)
+    columns, rows, width, height, header = grid_of([replace(CAMERAS[0], size=size) for size in sizes])
     assert columns * rows >= len(sizes) > columns * (rows - 1)
     assert columns * width <= WIDEST + 2 * columns
     assert rows * height <= TALLEST + 2 * rows
-    assert width % 2 == height % 2 == 0
+    assert width % 2 == height % 2 == header % 2 == 0

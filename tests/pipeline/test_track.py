@@ -169,8 +169,11 @@ def test_a_look_says_beforehand_what_the_run_s_says(recording, run):
 def test_an_overlay_has_a_frame_for_each_of_the_film(recording, run):
     overlay = made.images(run.folder / "overlay.mp4")
     assert len(overlay) == len(run.motion)
-    assert overlay[0].shape == (3 * made.SIZE[1], made.SIZE[0], 3)
-    bottom, film = overlay[10][2 * made.SIZE[1] :], made.images(recording / "video" / "cam.mp4")[10]
+    assert overlay[0].shape[1:] == (made.SIZE[0], 3)
+    below = np.array(overlay)[:, 3 * made.SIZE[1] :]
+    assert below.max((1, 2, 3)).min() > 100, "legend and status stand below"
+    assert (np.abs(np.diff(below.astype(int), axis=0)).max((1, 2, 3)) > 60).all(), "each frame has its time"
+    bottom, film = overlay[10][2 * made.SIZE[1] : 3 * made.SIZE[1]], made.images(recording / "video" / "cam.mp4")[10]
     assert np.abs(bottom.astype(int) - film).mean() < 20
 
 
@@ -243,7 +246,7 @@ def test_frames_before_the_person_and_without_them_are_absent(recording, tmp_pat
     assert any("the silhouette is empty in" in doubt for doubt in result.look.doubts)
     for n, shown in enumerate(made.images(result.folder / "overlay.mp4")):
         height = made.SIZE[1]
-        assert (shown[height + 30 : 2 * height].max() < 60) == absent[n]  # nothing is drawn of who is not there
+        assert (shown[height + 4 : 2 * height - 4].max() < 60) == absent[n]  # nothing is drawn of who is not there
 
 
 def test_a_run_that_lost_the_person_says_so(recording, tmp_path):

@@ -11,7 +11,7 @@ from shadowpuppet.tracking.status import status_of
 
 
 class Made(NamedTuple):
-    overlap: float
+    agreement: float
     status: str
     by: str = "before"
 
@@ -51,4 +51,4 @@ def test_what_follows_a_frame(before, cycled, found, chosen, by, called):
 
 
 def test_a_search_is_settled_by_cycles():
-    assert settle(made(0.0, ""), lambda state: state._replace(overlap=state.overlap + 1)).overlap == SETTLE_CYCLES
+    assert settle(made(0.0, ""), lambda state: state._replace(agreement=state.agreement + 1)).agreement == SETTLE_CYCLES

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -18,6 +19,7 @@ import made
 import numpy as np
 import pytest
 
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.live.display.view import SessionState
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.track import track_recording
@@ -201,6 +203,55 @@ def test_the_strip_seeks_and_a_joint_on_the_body_chooses_its_curves(browser, fil
         assert page.frame() < 7
 
 
+def test_pictures_silhouettes_and_keypoints_of_a_file_are_switched_on_and_off(browser, run, tmp_path):
+    from shadowpuppet.viewer.web.page import write_page
+
+    scene = cut_scene(open_scene(run), 0.0, 0.6)
+    size = np.array(scene.cameras[0].camera.size)
+
+    def keypoints(time):
+        spots = np.array([[0.3, 0.4], [0.7, 0.4], [0.5, 0.2 + 0.1 * time]]) * size
+        return Keypoints(("left_wrist", "right_wrist", "nose"), spots[None], np.array([[1.0, 0.5, 1.0]]), np.array([-1]), "HALPE_26")
+
+    file = write_page(tmp_path / "run.html", replace(scene, cameras=(replace(scene.cameras[0], keypoints=keypoints),)), pictures=True)
+    with page_of(browser, file.as_uri()) as page:
+        page.page.evaluate("page.seek(1)")
+        page.wait(lambda: page.page.evaluate("['film', 'person'].every(name => document.getElementById(name).naturalWidth > 0)"), "images")
+        marks = page.page.locator("#marks path")
+        assert [mark.get_attribute("stroke-opacity") for mark in marks.all()] == ["1", "0.5", "1"]
+        before = marks.nth(2).get_attribute("d")
+        page.page.evaluate("page.seek(3); page.look(0)")
+        assert marks.nth(2).get_attribute("d") != before, "they move"
+
+        def switch(name):
+            return page.page.get_by_label(name, exact=True)
+
+        def state():
+            return page.page.evaluate("""["film", "person"].map(name => document.getElementById(name)).map(
+                image => image.style.visibility == "visible" ? image.className || "alone" : "")""")
+
+        assert state() == ["alone", "over"]
+        def differs(seen):
+            return (np.abs(page.seen() - seen).max(2) > 18).sum()
+
+        seen = page.seen()
+        for name, told, other in (("keypoints", ["alone", "over"], 40), ("silhouettes", ["alone", ""], 3000), ("pictures", ["", ""], 3000)):
+            switch(name).click()
+            page.wait(lambda told=told: state() == told, name)
+            page.wait(lambda seen=seen, other=other: differs(seen) > other, f"{name} are gone from what is behind the body")
+            seen = page.seen()
+        assert marks.count() == 0
+        switch("silhouettes").click()
+        page.wait(lambda: state() == ["", "alone"], "the silhouette alone")
+        switch("keypoints").click()
+        assert marks.count() == 3
+        page.page.evaluate("page.frameAll()")
+        seen = page.seen()
+        switch("rays of the keypoints").click()
+        page.wait(lambda: differs(seen) > 100, "rays from the camera")
+        assert (page.outside(file.as_uri()), page.errors) == ([], [])
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [390, 820, 1280])
 def test_the_file_plays_alone_at_any_width_and_is_open_to_all(browser, file, axe, width, scheme):
@@ -300,7 +351,7 @@ def test_a_live_session_is_shown_in_space_and_its_buttons_are_commands(browser, 
         begun = place()
         page.wait(lambda: shows(10) and np.abs(np.subtract(place(), begun)).max() > 0.01, "it moves")
         page.wait(lambda: "0.91" in page.page.inner_text("#overlap"), "the overlap is said")
-        page.wait(lambda: shows(10) and page.page.evaluate("stage.cameras[0].ready"), "the camera has its image")
+        page.wait(lambda: shows(10) and page.page.evaluate("stage.cameras[0].layers.pictures.ready"), "the camera has its image")
         page.wait(lambda: shows(10, pose=None, status="lost") and page.page.inner_text("#chip") == "lost", "it says lost")
         page.wait(lambda: place() is None, "without a pose there is no body")
         page.wait(lambda: shows(10, again) and page.page.evaluate("stage.data.number") == 2, "measured again: a new scene")

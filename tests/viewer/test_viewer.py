@@ -21,10 +21,12 @@ from runs import body_of, make_people, make_run, smooth_poses
 from shadowpuppet.body.shapes import Quads
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.drawing import SIDE_COLOURS
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.cli.app import run as command
 from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid, rotation_about
 from shadowpuppet.io.calibration.calibration_files import write_calibration
+from shadowpuppet.io.keypoints.film_keypoints import film_keypoints, write_keypoints
 from shadowpuppet.io.motion.bvh_writer import write_bvh
 from shadowpuppet.io.motion.table import write_joints
 from shadowpuppet.io.prior import write_prior
@@ -205,7 +207,7 @@ def test_silhouettes_show_nothing_of_the_picture(rng):
     assert (a[20, 30], a[2, 2]) == (255, 0)
     picture = camera_image(OneFrame(noise, mask), plain, 0.0, True)
     assert picture.shape == (48, 64, 3)
-    assert np.abs(picture[40:, :10].astype(int) - noise[40:, :10]).max() <= 1
+    assert np.abs(picture.astype(int) - noise).max() <= 1
     assert camera_image(OneFrame(noise, mask), plain, 2.0, True) is None
     assert camera_image(OneFrame(noise, mask), plain, 2.0, False) is None
 
@@ -482,7 +484,7 @@ def unpacked(values: dict) -> np.ndarray:
 
 def test_the_page_has_the_figures_where_they_are(tmp_path):
     scene = open_scene(make_run(tmp_path / "run", frames=6, lost=(2,), spread=True, doubtful={4: {"left_arm": "uncertain"}}))
-    figure, data = scene.figures[0], content(page_text(scene, [], None, False))
+    figure, data = scene.figures[0], content(page_text(scene, [], None))
     (shown,) = data["figures"]
     assert unpacked(shown["frames"]).tolist() == [0, 1, -1, 2, 3, 4]  # of the five that are known
     J = shown["joints"]
@@ -504,7 +506,7 @@ def test_the_page_has_the_figures_where_they_are(tmp_path):
 
 
 def test_a_truth_with_bones_is_lines(tracked):
-    truth = content(page_text(open_scene(tracked), [], None, False))["figures"][1]
+    truth = content(page_text(open_scene(tracked), [], None))["figures"][1]
     assert truth["kind"] == "truth"
     assert "mesh" not in truth
     assert [truth["jointNames"][a] for a, _ in truth["bones"]].count("neck") > 1
@@ -512,7 +514,7 @@ def test_a_truth_with_bones_is_lines(tracked):
 
 def test_what_a_page_may_fetch_and_texts_of_others_cannot_be_script():
     scene = Stage(title="</script><b>run</b>", times=np.zeros(1), facts={"a": "</script><script>alert(1)</script>"})
-    alone, served = page_text(scene, [], [], False), page_text(scene, [], None, False)
+    alone, served = page_text(scene, [], {}), page_text(scene, [], None)
     for page in (alone, served):
         assert "<b>" not in page
         assert page.count("</script>") == 2
@@ -526,7 +528,7 @@ def test_what_a_page_may_fetch_and_texts_of_others_cannot_be_script():
 
 @pytest.mark.parametrize("name", ["@SCRIPT@", "@DATA@", "@POLICY@", "@STYLE@", "@TITLE@", r"\g<1> \1 @NONE@"])
 def test_names_that_look_like_places_of_the_template_stay_names(name):
-    usual, page = (page_text(Stage(title=each, times=np.zeros(1), facts={"camera": each}), [], [], False) for each in ("walk-on", name))
+    usual, page = (page_text(Stage(title=each, times=np.zeros(1), facts={"camera": each}), [], {}) for each in ("walk-on", name))
     told = content(page)
     for written in (json.dumps(name)[1:-1].replace("<", "\\u003c"), name, escape(name)):
         page = page.replace(written, "walk-on")
@@ -535,18 +537,64 @@ def test_names_that_look_like_places_of_the_template_stay_names(name):
 
 
 def test_a_file_has_pictures_only_where_they_are_asked_for(tracked, tmp_path):
-    """What is in the file: silhouettes of two colours, or pictures."""
+    """What is in the file: silhouettes of two colours, and pictures if they are asked for."""
     scene = cut_scene(open_scene(tracked), 0.0, 0.2)
-    found = {}
     for asked in (False, True):
-        data = content(write_page(tmp_path / f"{asked}.html", scene, asked).read_text())
-        (images,) = data["images"]
-        assert len(images) == len(unpacked(data["times"]))
-        kind, _, text = images[0].partition(";base64,")
-        found[kind] = cv2.imdecode(np.frombuffer(base64.b64decode(text), np.uint8), cv2.IMREAD_UNCHANGED)
-    assert set(found) == {"data:image/png", "data:image/jpeg"}
-    assert set(np.unique(found["data:image/png"])) == {0, 255}
-    assert found["data:image/jpeg"].ndim == 3
+        text = write_page(tmp_path / f"{asked}.html", scene, asked).read_text()
+        data, found = content(text), {}
+        for layer, of_cameras in data["images"].items():
+            (images,) = of_cameras
+            assert len(images) == len(unpacked(data["times"]))
+            kind, _, coded = images[0].partition(";base64,")
+            found[layer] = kind, cv2.imdecode(np.frombuffer(base64.b64decode(coded), np.uint8), cv2.IMREAD_UNCHANGED)
+        assert {layer: kind for layer, (kind, _) in found.items()} == {
+            "silhouettes": "data:image/png", **({"pictures": "data:image/jpeg"} if asked else {})}
+        assert set(np.unique(found["silhouettes"][1])) == {0, 255}
+        assert ("image/jpeg" in text) == asked
+        if asked:
+            assert found["pictures"][1].ndim == 3
+
+
+@pytest.mark.parametrize("fisheye", [False, True])
+def test_keypoints_are_crosses_where_the_undistorted_picture_has_them(fisheye, rng):
+    """Two people in the second of three frames, nobody in the last; confidences and sides as they are."""
+    camera = replace(Camera.from_fov((320, 240), 1.2), distortion=np.array([-0.2, 0.05, 0, 0]), fisheye=fisheye)
+    names, lens = ("left_wrist", "right_wrist", "nose"), Undistorter(camera, 240)
+    points = [rng.uniform((60, 50), (260, 190), (people, 3, 2)) for people in (1, 2, 0)]
+    points[0][0, 1] = np.nan
+    sure = [np.where(np.isnan(each).any(2), 0, 0.5) for each in points]
+    found = [Keypoints(names, each, own, np.full(len(each), -1), "HALPE_26") for each, own in zip(points, sure)]
+    scene = Stage(title="", times=np.arange(3.0), cameras=(SceneCamera(camera, keypoints=lambda time: found[int(time)]),))
+    data = content(page_text(scene, [lens], None))
+    (own,) = data["cameras"]
+    assert own["sides"] == [1, 2, 0, 1, 2, 0]
+    assert data["sides"][1:] == [[*colour[::-1]] for colour in SIDE_COLOURS.values()]
+    marks = unpacked(own["keypoints"]).reshape(3, 6, 3) / 10_000
+    for n, each in enumerate(points):
+        assert marks[n, :, 2].tolist() == [*sure[n].ravel(), *[0] * (6 - each[..., 0].size)]
+        for place, (x, y) in zip(marks[n, :, :2], each.reshape(-1, 2)):
+            if np.isfinite(x):
+                image = np.zeros((240, 320), np.uint8)
+                cv2.circle(image, (round(16 * x), round(16 * y)), 16 * 4, 255, -1, cv2.LINE_AA, 4)
+                where = np.argwhere(lens(image) > 100).mean(0)[::-1]
+                assert (place + 1) / 2 * lens.size - 0.5 == pytest.approx(where, abs=0.8)
+    assert "keypoints" not in content(page_text(replace(scene, cameras=(SceneCamera(camera),)), [lens], None))["cameras"][0]
+
+
+def test_a_recordings_keypoints_are_those_of_the_frames(rig, tmp_path):
+    folder = made.copied(rig, tmp_path / "rig")
+    (folder / "keypoints").mkdir()
+    spots = np.stack([np.arange(made_rig.FRAMES) + 20.0, np.full(made_rig.FRAMES, 30.0)], 1)[:, None]
+    ones = np.ones(made_rig.FRAMES)
+    for camera in made_rig.cameras():
+        write_keypoints(folder / "keypoints" / f"{camera.name}.npz", film_keypoints(
+            ["nose"], np.arange(made_rig.FRAMES), ones, spots, ones[:, None], "HALPE_26", made_rig.SIZE))
+    scene = open_scene(folder)
+    for n in (0, 7, 23):
+        for each in scene.cameras:
+            assert each.keypoints is not None
+            assert each.keypoints(float(scene.times[n])).xy.tolist() == [[[20.0 + n, 30.0]]]
+    assert open_scene(rig).cameras[0].keypoints is None
 
 
 def test_what_the_page_asks_for_is_made(tracked, rig):

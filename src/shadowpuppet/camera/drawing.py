@@ -2,49 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Container
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.body.skeleton import BONES
+from shadowpuppet.camera.captions import WHITE, Colour, Words
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, inverse, transform
 
 if TYPE_CHECKING:  # slow to import
+    from shadowpuppet.camera.keypoints import Keypoints
     from shadowpuppet.camera.rasterize import Picture
     from shadowpuppet.video import Image
 
-Colour = tuple[int, int, int]
-"""Blue, green, red."""
 # Colours that colour-blind people can tell apart: Okabe & Ito 2008.
-BLACK, GREY, WHITE = (0, 0, 0), (96, 96, 96), (255, 255, 255)
+BLACK, GREY = (0, 0, 0), (96, 96, 96)
 MODEL_ONLY, SILHOUETTE_ONLY = (0, 159, 230), (233, 180, 86)
 SIDE_COLOURS = {"left": (115, 158, 0), "right": (167, 121, 204)}
 MIDDLE_COLOUR = (66, 228, 240)
 """The colour of parts that are neither left nor right."""
-PALE, PALENESS = (190, 190, 190), 0.7
-"""The colour mixed into a doubtful limb's, and its share."""
-DASH = 8
-"""Length of the dashes and gaps of such a limb's bones, in pictures 240 pixels high, pixels."""
+LEGEND: Words = (("left", SIDE_COLOURS["left"]), ("right", SIDE_COLOURS["right"]), ("dashed: doubtful", WHITE))
+"""The model's colours in words."""
+CROSS: Words = (("cross: keypoint", WHITE),)
+"""Keypoints in words."""
+SHOWN = 0.5
+"""Opacity of the model where the picture behind it is to be seen."""
+DASH = 4.5
+"""Length of the dashes and gaps of a doubtful limb's lines, over the lines' width."""
 MATCHING = np.array([BLACK, MODEL_ONLY, SILHOUETTE_ONLY, WHITE, (40, 40, 40), (40, 40, 40), GREY, GREY], np.uint8)
 """Colours of the matching row, indexed by model + 2 silhouette + 4 ignored."""
-LINE = 36
-"""Distance of lines of text, pixels at a scale of 1."""
+MATCHED: Words = (("model only", MODEL_ONLY), ("silhouette only", SILHOUETTE_ONLY), ("both: white", WHITE),
+                  ("left out: grey", (150, 150, 150)))
+"""The same in words."""
 SUBPIXEL = 4
 """Fractional bits of pixel coordinates in OpenCV's drawing."""
 
 
-def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLike, *, status: str, time: float, overlap: float = np.nan,
-                  ignore: ArrayLike | None = None, doubtful: Container[str] = (), last: tuple[ArrayLike, float] | None = None) -> Image:
+def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLike, *, ignore: ArrayLike | None = None,
+                  doubtful: Container[str] = (), last: ArrayLike | None = None, keypoints: Keypoints | None = None) -> Image:
     """The three rows (3 H, W, 3), blue green red, of a frame.
 
-    Top: the model over the darkened picture, cards brighter the more they face the camera. Middle: where model and silhouette `mask` (H,
-    W) agree (white) or differ, and ignored pixels, `ignore` (H, W), in greys. Bottom: the picture with the skeleton, the time (s),
-    the status and the overlap. Shapes and bones whose names are `doubtful` are pale, and the bones dashed. Where the `pose` (D,) is not
-    finite, the skeleton has the `last` finite pose, of a time (s), all pale. Raises `ShadowPuppetError` for a picture that is
-    not of the camera's size.
+    Top: the model and its bones over the darkened picture. Middle: where model and silhouette `mask` (H, W) agree (white) or differ, and
+    ignored pixels, `ignore` (H, W), in greys. Bottom: the picture with the bones. Shapes and bones whose names are `doubtful` are dashed.
+    Where the `pose` (D,) is not finite, the bones of the bottom are those of the `last` finite pose, all dashed. A detector's `keypoints`
+    are crosses. Raises `ShadowPuppetError` for a picture that is not of the camera's size.
     """
     image, pose, mask = in_colour(image), np.asarray(pose, float), np.asarray(mask, bool)
     size = picture.camera.size
@@ -53,22 +57,16 @@ def overlay_frame(image: Image, mask: ArrayLike, picture: Picture, pose: ArrayLi
             raise ShadowPuppetError(f"overlay: {what}: found {array.shape[1]} x {array.shape[0]} pixels, the camera has "
                                     f"{size[0]} x {size[1]}")
     known = bool(np.isfinite(pose).all())
-    height = size[1]
-    out = np.empty((3 * height, size[0], 3), np.uint8)
-    out[:height], out[2 * height :] = _darkened(image), image
+    top, bottom = _darkened(image), image.copy()
     if known:
-        draw_model(out[:height], picture, pose, doubtful)
-        draw_skeleton(out[2 * height :], picture, pose, doubtful)
+        draw_person(top, picture, pose, doubtful)
+        draw_skeleton(bottom, picture, pose, doubtful)
     elif last is not None:
-        draw_skeleton(out[2 * height :], picture, np.asarray(last[0], float), picture.body.landmark_names)
-    out[height : 2 * height] = matching(picture.mask(pose) if known else np.zeros_like(mask), mask, ignore)
-    _label(out, height, said_of(status, None if known or last is None else last[1]), time, overlap, ignore is not None)
-    return out
-
-
-def said_of(status: str, last: float | None) -> str:
-    """A status in words; `last`: time (s) of the pose that is shown in place of the frame's own, None if that is shown."""
-    return status if last is None else f"{status}, pale: at {last:.2f} s"
+        draw_skeleton(bottom, picture, np.asarray(last, float), picture.body.landmark_names)
+    if keypoints is not None:
+        draw_keypoints(top, keypoints)
+        draw_keypoints(bottom, keypoints)
+    return np.concatenate([top, matching(picture.mask(pose) if known else np.zeros_like(mask), mask, ignore), bottom])
 
 
 def matching(model: NDArray[np.bool_], mask: NDArray[np.bool_], ignore: ArrayLike | None = None) -> Image:
@@ -79,22 +77,35 @@ def matching(model: NDArray[np.bool_], mask: NDArray[np.bool_], ignore: ArrayLik
     return MATCHING[index]
 
 
+def draw_person(image: Image, picture: Picture, pose: Array, doubtful: Container[str] = ()) -> None:
+    """Draw the body in the pose (D,) into an image (H, W, 3) that shows through it, and its bones over it; see `draw_model`."""
+    import cv2
+
+    drawn = image.copy()
+    draw_model(drawn, picture, pose, doubtful)
+    image[:] = cv2.addWeighted(drawn, SHOWN, image, 1 - SHOWN, 0)
+    draw_skeleton(image, picture, pose, doubtful)
+
+
 def draw_model(image: Image, picture: Picture, pose: Array, doubtful: Container[str] = ()) -> None:
-    """Draw the body in the pose (D,) into an image (H, W, 3), shaded and outlined, farthest shapes first; `doubtful` parts are pale."""
+    """Draw the body in the pose (D,) into an image (H, W, 3), shaded and outlined, farthest shapes first; `doubtful` parts are dashed
+    outlines."""
     import cv2
 
     from shadowpuppet.body.shapes import Quads
 
-    pieces = (_of_quads if isinstance(picture.body.shapes, Quads) else _of_hulls)(picture, pose, doubtful)
+    pieces = (_of_quads if isinstance(picture.body.shapes, Quads) else _of_hulls)(picture, pose)
     width = max(1, round(image.shape[0] / 300))
     for piece in sorted(pieces, key=lambda piece: -piece.depth):
-        for corners, colour in piece.fills:
+        is_doubtful = piece.part in doubtful
+        for corners, colour in () if is_doubtful else piece.fills:
             cv2.fillConvexPoly(image, _fixed(corners), colour, cv2.LINE_AA, SUBPIXEL)
-        cv2.polylines(image, [_fixed(piece.edge)], False, (25, 25, 25), width, cv2.LINE_AA, SUBPIXEL)
+        colour, dash = (colour_of(piece.part), DASH * (width + 1)) if is_doubtful else ((25, 25, 25), 0)
+        draw_line(image, piece.edge, colour, width + is_doubtful, dash)
 
 
 def draw_skeleton(image: Image, picture: Picture, pose: Array, doubtful: Container[str] = ()) -> None:
-    """Draw the bones and joints of the pose (D,) into an image (H, W, 3); bones that lead to `doubtful` landmarks are dashed and pale."""
+    """Draw the bones and joints of the pose (D,) into an image (H, W, 3); bones that lead to `doubtful` landmarks are dashed."""
     import cv2
 
     points = picture.body.points(pose[None], picture.T_camera_base)[0]
@@ -104,25 +115,67 @@ def draw_skeleton(image: Image, picture: Picture, pose: Array, doubtful: Contain
     bones = [(visible[a], visible[b], b) for a, b in BONES if a in visible and b in visible]
     joints = {name for bone in BONES for name in bone}
     dots = [_point(visible[name]) for name in names if name in visible and name in joints]
-    unit = max(1.0, image.shape[0] / 240)
+    metre = picture.camera.matrix[1, 1] / max(float(np.median(points[:, 2])), 1e-3)  # in pixels
+    unit = min(_unit(image), max(0.7, metre / 100))  # thin lines on people far off
     for extra, dark in ((2, True), (0, False)):  # a dark rim, so that bones stand out from any clothes
         for a, b, name in bones:
-            draw_bone(image, a, b, BLACK if dark else colour_of(name, doubtful), round(2 * unit) + extra, name in doubtful)
+            width = round(2 * unit)
+            draw_line(image, np.array([a, b]), BLACK if dark else colour_of(name), width + extra, DASH * width * (name in doubtful))
     for radius, colour in ((3, BLACK), (2, WHITE)):
         for dot in dots:
             cv2.circle(image, dot, round(radius * unit) << SUBPIXEL, colour, -1, cv2.LINE_AA, SUBPIXEL)
 
 
-def draw_bone(image: Image, start: Array, end: Array, colour: Colour, width: int, dashed: bool) -> None:
-    """Draw the line between two pixels (2,) into an image (H, W, 3)."""
+def draw_line(image: Image, points: Array, colour: Colour, width: int, dash: float = 0) -> None:
+    """Draw the line through pixels (K, 2) into an image (H, W, 3), in dashes of a length, pixels; 0: whole."""
     import cv2
 
-    pieces = 1
-    if dashed and (length := float(np.hypot(*(end - start)))) < 10 * image.shape[0]:  # else it is mostly far outside the picture
-        pieces = 2 * round(length / (2 * DASH * max(1.0, image.shape[0] / 240))) + 1  # odd: a dash at both ends
-    ends = start + np.linspace(0, 1, pieces + 1)[:, None] * (end - start)
-    for n in range(0, pieces, 2):
-        cv2.line(image, _point(ends[n]), _point(ends[n + 1]), colour, width, cv2.LINE_AA, SUBPIXEL)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    parts = [points]
+    if dash and along[-1] < 10 * image.shape[0]:  # else it is mostly far outside the picture
+        pieces = 2 * round(along[-1] / (2 * dash)) + 1  # odd: a dash at both ends
+        starts, stops = np.linspace(0, along[-1], pieces + 1).reshape(-1, 2).T
+        starts[1:] += width / 2  # a line ends in a round cap
+        stops[:-1] = np.maximum(stops[:-1] - width / 2, starts[:-1])
+        ends = [np.array([start, *along[(along > start) & (along < stop)], stop]) for start, stop in zip(starts, stops)]
+        parts = [np.stack([np.interp(each, along, axis) for axis in points.T], 1) for each in ends]
+    cv2.polylines(image, list(map(_fixed, parts)), False, colour, width, cv2.LINE_AA, SUBPIXEL)
+
+
+def draw_keypoints(image: Image, keypoints: Keypoints) -> None:
+    """Draw keypoints as thin crosses in the colours of their sides, the fainter the less confident, into an image
+    (H, W, 3)."""
+    import cv2
+
+    arm = round(4 * _unit(image))
+    for name, at, sure in zip(np.tile(keypoints.names, len(keypoints.xy)), keypoints.xy.reshape(-1, 2), keypoints.confidence.ravel()):
+        if np.isfinite(at).all():
+            place = np.round(at).astype(int)
+            left, top = np.maximum(place - arm - 2, 0)
+            patch = image[top : top + 2 * arm + 5, left : left + 2 * arm + 5]
+            drawn, (x, y) = patch.copy(), (place - (left, top)).tolist()
+            light = tuple((255 + value) // 2 for value in colour_of(name))  # seen on the bone of the same side
+            for colour, aside in ((BLACK, 1), (light, 0)):
+                cv2.drawMarker(drawn, (x + aside, y + aside), colour, cv2.MARKER_CROSS, 2 * arm, 1)
+            patch[:] = cv2.addWeighted(drawn, float(sure), patch, 1 - float(sure), 0)
+
+
+def write_over(image: Image, text: str, picture: Picture, pose: Array) -> None:
+    """Write a text above the head of the body in the pose (D,) into an image (H, W, 3)."""
+    import cv2
+
+    rows, columns = np.nonzero(picture.mask(pose))
+    if len(rows):
+        scale = 0.5 * _unit(image)
+        (width, _), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)
+        place = int(columns[rows == rows[0]].mean()) - width // 2, max(int(rows[0]) - round(8 * scale), round(24 * scale))
+        for colour, thickness in ((BLACK, round(6 * scale)), (WHITE, round(2 * scale))):
+            cv2.putText(image, text, place, cv2.FONT_HERSHEY_SIMPLEX, scale, colour, thickness, cv2.LINE_AA)
+
+
+def _unit(image: Image) -> float:
+    """Pixels of an image (H, W, 3) for one of a picture 240 pixels high; 1 in smaller ones."""
+    return max(1.0, image.shape[0] / 240)
 
 
 def in_colour(image: Image) -> Image:
@@ -139,18 +192,15 @@ def _darkened(image: Image) -> Image:
     return np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR), np.uint8)
 
 
-def colour_of(name: str, doubtful: Container[str] = ()) -> Colour:
-    """The colour of a landmark's bone or of a part by its side, pale if it is `doubtful`."""
-    colour = SIDE_COLOURS.get(name.split("_")[0], MIDDLE_COLOUR)
-    if name not in doubtful:
-        return colour
-    blue, green, red = (round((1 - PALENESS) * own + PALENESS * pale) for own, pale in zip(colour, PALE))
-    return blue, green, red
+def colour_of(name: str) -> Colour:
+    """The colour of a landmark's bone or of a part by its side."""
+    return SIDE_COLOURS.get(name.split("_")[0], MIDDLE_COLOUR)
 
 
 class _Piece(NamedTuple):
     """A flat piece of the model."""
 
+    part: str
     depth: float
     """Distance from the camera, metres."""
     fills: list[tuple[Array, tuple[float, ...]]]
@@ -159,18 +209,18 @@ class _Piece(NamedTuple):
     """The line (K, 2), pixels, that is outlined."""
 
 
-def _of_quads(picture: Picture, pose: Array, doubtful: Container[str]) -> list[_Piece]:
+def _of_quads(picture: Picture, pose: Array) -> list[_Piece]:
     """Pieces of quads, each cut in four: crossing cards overlap, their quarters mostly do not."""
     body = picture.body
     quarters = _quarters(picture.transforms(pose[None])[0], body.shapes.arrays[0], body.shapes.joints[:, 0])
     pixels, depths = _pixels(picture, quarters), quarters[..., 2].mean(2)
     shades = _shades(quarters)
     # The first three corners of a quarter lie on the card's edge; only this edge is outlined.
-    return [_Piece(depths[q, k], [(pixels[q, k], _shaded(colour_of(part, doubtful), shades[q, k]))], pixels[q, k, :3])
+    return [_Piece(part, depths[q, k], [(pixels[q, k], _shaded(colour_of(part), shades[q, k]))], pixels[q, k, :3])
             for q, part in enumerate(body.parts) for k in range(4) if np.isfinite(pixels[q, k]).all()]
 
 
-def _of_hulls(picture: Picture, pose: Array, doubtful: Container[str]) -> list[_Piece]:
+def _of_hulls(picture: Picture, pose: Array) -> list[_Piece]:
     """Pieces of hulls: their outlines, brighter toward the middle."""
     body, T = picture.body, picture.transforms(pose[None])
     corners, counts = picture.polygons(T, np.arange(len(body.parts)))
@@ -180,9 +230,9 @@ def _of_hulls(picture: Picture, pose: Array, doubtful: Container[str]) -> list[_
     for i in np.flatnonzero(counts[0]):
         outline, part = corners[0, i, : counts[0, i]], body.parts[i]
         middle = outline.mean(0)
-        colour = colour_of(part, doubtful)
+        colour = colour_of(part)
         fills = [(middle + size * (outline - middle), _shaded(colour, 1 - 0.45 * size**2)) for size in (1.0, 0.8, 0.6, 0.4, 0.2)]
-        pieces.append(_Piece(depths[i], fills, np.concatenate([outline, outline[:1]])))
+        pieces.append(_Piece(part, depths[i], fills, np.concatenate([outline, outline[:1]])))
     return pieces
 
 
@@ -220,60 +270,3 @@ def _fixed(pixels: Array) -> NDArray[np.int32]:
 def _point(pixel: Array) -> tuple[int, int]:
     x, y = _fixed(pixel).tolist()
     return x, y
-
-
-LEGEND = (("left", SIDE_COLOURS["left"]), ("right", SIDE_COLOURS["right"]), ("pale: doubtful", PALE))
-"""The model's colours."""
-
-
-def _label(out: Image, height: int, status: str, time: float, overlap: float, ignores: bool) -> None:
-    fit = "" if np.isnan(overlap) else f"  IoU {overlap:.2f}"
-    write_words(out, 0, (("best estimate", WHITE), *LEGEND))
-    left_out = (("left out", (150, 150, 150)),) if ignores else ()
-    write_words(out, height, (("model only", MODEL_ONLY), ("silhouette only", SILHOUETTE_ONLY), ("both", WHITE), *left_out))
-    for top, line in lines_below(out, f"{time:.2f} s  {status}{fit}", 2 * height):
-        write_text(out, line, top, WHITE)
-
-
-def write_words(out: Image, top: int, words: Iterable[tuple[str, Colour]], size: float | None = None) -> None:
-    """Write words in their colours beside each other below `top`, scaled as by `write_text`."""
-    end = 0
-    for text, colour in words:
-        end = write_text(out, text, top, colour, end, size)
-
-
-def lines_below(out: Image, text: str, top: int, size: float | None = None) -> list[tuple[int, str]]:
-    """A text as lines that fit into a picture, broken at blanks, each with its `top` for `write_text`, the first's below `top`."""
-    import cv2
-
-    scale, thickness = _scale(out, size)
-    lines, most = [""], out.shape[1] - round(12 * scale)
-    for word in text.split(" "):
-        longer = f"{lines[-1]} {word}" if lines[-1] else word
-        (width, _), _ = cv2.getTextSize(longer, cv2.FONT_HERSHEY_SIMPLEX, scale, thickness)
-        if lines[-1] and round(12 * scale) + width > most:
-            lines.append(word)
-        else:
-            lines[-1] = longer
-    return [(top + n * round(LINE * scale), line) for n, line in enumerate(lines)]
-
-
-def _scale(out: Image, size: float | None) -> tuple[float, int]:
-    """Scale of the font and thickness of its lines for a picture of height `size`; None: for one of three rows."""
-    scale = max(0.35, (out.shape[0] / 3 if size is None else size) / 600)
-    return scale, max(1, round(1.5 * scale))
-
-
-def write_text(out: Image, text: str, top: int, colour: tuple[int, int, int], left: int = 0, size: float | None = None) -> int:
-    """Write a line of text with a dark rim below `top`, scaled for a picture of height `size`; returns the text's right end."""
-    import cv2
-
-    scale, thickness = _scale(out, size)
-    rim = max(1, round(scale))
-    (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, thickness)
-    x, y = left + round(12 * scale), top + height + round(12 * scale)
-    # The rim is the same text moved, because OpenCV 5 draws thicker text wider.
-    for dx, dy, ink in ((-1, -1, BLACK), (1, -1, BLACK), (-1, 1, BLACK), (1, 1, BLACK), (0, 0, colour)):
-        place = (x + rim * dx, y + rim * dy)
-        cv2.putText(out, text, place, cv2.FONT_HERSHEY_SIMPLEX, scale, ink, thickness, cv2.LINE_AA)
-    return x + width + round(10 * scale)

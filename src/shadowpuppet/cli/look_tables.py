@@ -98,7 +98,8 @@ def _rig_scale(look: RigLook) -> list[tuple[str, str | None]]:
 def _rig_table(look: RigLook) -> RenderableType:
     """A row for each camera."""
     cameras = ((camera.name, _pixels(camera), f"{camera.fov:.0f}°", " ".join(f"{value:.1f}" for value in camera.place),
-                f"{100 * camera.quality.area:.1f} %", "" if camera.exact_overlap is None else f"{camera.exact_overlap:.3f}",
+                f"{100 * camera.quality.area:.1f} %" if camera.quality.frames else "",
+                "" if camera.exact_overlap is None else f"{camera.exact_overlap:.3f}",
                 "" if apart is None else f"{apart:.1f} px") for camera, apart in zip(look.cameras, look.agreement.apart))  # fmt: skip
     keys = sorted({camera.key.split(":")[0] for camera in look.cameras} - {"none"})
     below = [("background", "; ".join(sorted(set(map(_background, look.cameras))))),

@@ -37,6 +37,7 @@ class LogLines:
         """Nothing is printed before `start`."""
         self.console, self._line, self._pause = console, line, pause
         self._end: threading.Event | None = None
+        self._compiled = False
         self._printer: threading.Thread | None = None
 
     def start(self) -> None:
@@ -55,7 +56,9 @@ class LogLines:
 
     def _run(self, end: threading.Event) -> None:
         while not end.wait(self._pause()):
-            self.console.print(printable(f"{PROGRESS} {self._line()}{_compiling()}"), soft_wrap=True)
+            compiling = "" if self._compiled else _compiling()  # said once
+            self._compiled = self._compiled or bool(compiling)
+            self.console.print(printable(f"{PROGRESS} {self._line()}{compiling}"), soft_wrap=True)
 
 
 class _Log(LogLines):
@@ -177,8 +180,10 @@ class Terminal(LiveListener):
 
     def _show_warning(self, message: Warning | str, category: type[Warning], filename: str, lineno: int, file: TextIO | None = None,
                       line: str | None = None) -> None:
-        where = "" if issubclass(category, ShadowPuppetWarning) else f"{category.__name__} in {Path(filename).name}:{lineno}: "
-        self.warn(where + str(message))
+        if issubclass(category, ShadowPuppetWarning):
+            self.warn(str(message))
+        elif self.verbose:  # about the program's own code, not about anything that the user can change
+            self.warn(f"{category.__name__} in {Path(filename).name}:{lineno}: {message}")
 
 
 @contextmanager

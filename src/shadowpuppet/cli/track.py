@@ -111,8 +111,8 @@ def _people_done(folder: Path, metrics: Mapping[str, Any], quiet: bool) -> int:
     if not quiet:
         names = [f"person-{number}" for number in people]
         verdicts = [verdict_of(each["verdict"], f"person {number}") for number, each in people.items() if "verdict" in each]
-        speed = "speed", f"{metrics['frames_per_s']:.1f} frame sets/s"
-        show(people_table(people), *verdicts, pairs([speed, files_in(folder, "people.csv", "overlay.mp4", *names)]))
+        speed = f"{metrics['frames_per_s']:.3g} frame sets/s" if metrics["frames_per_s"] else None
+        show(people_table(people), *verdicts, pairs([("speed", speed), files_in(folder, "people.csv", "overlay.mp4", *names)]))
     lost = [number for number, each in people.items() if is_lost(each["status"], each["frames"])]
     if len(lost) < len(people):
         return 0
@@ -258,7 +258,7 @@ def fit_person(recording: RecordingPath, /, *, file: Annotated[Path, output("Fil
 def _show_run(folder: Path, metrics: Mapping[str, Any], *pictures: str) -> None:
     """Print the metrics and files of a run."""
     stages = ", ".join(f"{stage} {value:.1f}" for stage, value in metrics["ms_per_frame"].items())
-    speed = f"{metrics['frames_per_s']:.0f} frames/s (ms a frame: {stages})"
+    speed = f"{metrics['frames_per_s']:.3g} frames/s (ms a frame: {stages})" if metrics["frames_per_s"] else None
     errors = [error_table(metrics["errors"])] if "errors" in metrics else []
     files = files_in(folder, *pictures, "overlay.mp4", "joints.csv", "angles.csv", "intervals.csv")
     verdict = metrics.get("verdict")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     ViewFlags = Any
 else:
     TRACKING = ("preset", "seed", "height", "distance", "body", "person", "prior", "masks", "label", "overlay", "smooth", "cutoff", "gaps",
-                "facing", "appearance")
+                "facing", "appearance", "anyway")
     ViewFlags = unpacked(flags_of(Options, without=(*TRACKING, "start", "end")))
     """Options for looking at a recording."""
 

@@ -23,7 +23,7 @@ from shadowpuppet.io.recording import Recording, View, read_recording
 from shadowpuppet.names import composed
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.video import FrameSource, Image, camera_number, fitted, open_frames, open_untimed
-from shadowpuppet.video.frames import ROUNDING, Wanted
+from shadowpuppet.video.frames import ASSUMED_RATE, ROUNDING, Wanted
 from shadowpuppet.video.moments import span_of
 from shadowpuppet.video.seeking import Seeker
 
@@ -82,6 +82,12 @@ class Footage:
     def keypoints(self) -> FilmKeypoints | None:
         """What a detector found in the film, in pixels of full size; None without it. Raises `FormatError`."""
         return None if self.view.keypoints is None else self.view.keypoints.read(self.view.camera.size)
+
+    def keypoints_at(self, time: float) -> Keypoints:
+        """What the detector found in the frame at a time of the recording (s), in pixels of the working size."""
+        assert self.keypoints is not None
+        rate = self.film.rate if np.isfinite(self.film.rate) else ASSUMED_RATE
+        return self.keypoints.at(round((time + self.view.start) * rate)).scaled(self.view.camera.size, self.camera.size)
 
     def __getstate__(self) -> dict[str, object]:
         """What another process needs, which opens the film itself."""

@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.camera.mask import half_size
-from shadowpuppet.errors import ShadowPuppetError, warn
+from shadowpuppet.errors import ShadowPuppetError, ShadowPuppetWarning, warn
 from shadowpuppet.pipeline.rig import FrameSet, Rig, read_frames
-from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.pipeline.silhouettes import Silhouettes, segments_of
 from shadowpuppet.threads import child_environment, usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 
@@ -46,7 +46,7 @@ class Task:
 
     rig: Rig
     silhouettes: tuple[Silhouettes, ...]
-    """Of each camera."""
+    """Of each camera; empty if keypoints alone are evidence."""
     ready: bool = False
     """Whether ready silhouettes are read."""
     every: int = 1
@@ -61,15 +61,14 @@ class Task:
 
     def frames(self) -> Generator[FrameSet]:
         """The frame sets, made here."""
-        segment = [each.segmented for each in self.silhouettes]
-        with closing(read_frames(self.rig, segment, ready=self.ready, every=self.every)) as frames:
+        with closing(read_frames(self.rig, segments_of(self.rig, self.silhouettes), ready=self.ready, every=self.every)) as frames:
             for each in frames:
                 begin = time.perf_counter()
                 points = None if self.hull is None else self.hull.points(each.seen.masks)
                 images = each.images if self.images else (None,) * len(each.images)
                 corrected = tuple(None if image is None else half_size(image) for image in each.corrected) if self.corrected else ()
                 seen = each.seen
-                if self.codes and each.corrected:
+                if self.codes and any(image is not None for image in each.corrected):
                     seen = seen._replace(codes=tuple(map(colour_codes, each.corrected)))
                 yield each._replace(images=images, seen=seen, corrected=corrected, points=points, carving=time.perf_counter() - begin)
 
@@ -84,7 +83,7 @@ class _Message(NamedTuple):
     """What the process sends: a frame set, an error, or neither at the end."""
 
     seen: FrameSet | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Warning | str, ...] = ()
     error: Exception | None = None
 
 
@@ -113,7 +112,10 @@ def _received(packed: bytes) -> Generator[FrameSet]:
     try:
         while (message := _next(messages, thread)) is not None:
             for each in message.warnings:
-                warn(each)
+                if isinstance(each, ShadowPuppetWarning):
+                    warn(str(each))
+                else:
+                    warnings.warn(each, stacklevel=2)
             if message.error is not None:
                 raise message.error
             if message.seen is None:
@@ -199,8 +201,8 @@ def main() -> None:
             _write(made, _Message(warnings=_taken(caught), error=error))
 
 
-def _taken(caught: list[warnings.WarningMessage]) -> tuple[str, ...]:
-    """The texts of caught warnings, which are then forgotten."""
-    texts = tuple(str(each.message) for each in caught)
+def _taken(caught: list[warnings.WarningMessage]) -> tuple[Warning | str, ...]:
+    """Caught warnings, which are then forgotten."""
+    taken = tuple(each.message for each in caught)
     caught.clear()
-    return texts
+    return taken

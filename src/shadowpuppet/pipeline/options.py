@@ -93,9 +93,9 @@ class Options:
     """Picture or film of the empty scene in place of the recording's own; one camera only."""
     masks: bool = False
     """Use the recording's ready silhouettes (masks/) instead of segmenting the film."""
-    evidence: Literal["silhouettes", "silhouettes,keypoints"] | None = None
-    """What a person is tracked by: silhouettes, or these and a detector's keypoints (keypoints/), several cameras only. By default by all
-    that the recording has; with the papers' presets by silhouettes."""
+    evidence: Literal["silhouettes", "keypoints", "silhouettes,keypoints"] | None = None
+    """What a person is tracked by: silhouettes; a detector's keypoints (keypoints/), which need no empty scene; or both, with several
+    cameras only. By default by both where there are keypoints, with one camera and with the papers' presets by silhouettes."""
     people: Annotated[int, Field(ge=1, le=6)] | None = None
     """Number of people to follow, 1 to 6, with one camera or live 1; by default they are counted. Anybody else is ignored."""
     label: Annotated[int, Field(ge=0)] | None = None
@@ -136,6 +136,11 @@ class Options:
     """Estimation of the person's sizes."""
     training: PriorSettings = PriorSettings()
     """Learning a motion prior, from the recording's training motion or by `fit-prior`."""
+
+    @property
+    def uses_silhouettes(self) -> bool:
+        """Whether silhouettes are used."""
+        return self.evidence != "keypoints"
 
     @property
     def uses_keypoints(self) -> bool:
@@ -203,6 +208,10 @@ def check_used(options: Options, several: bool) -> None:
     idle = [name for key in (OF_ONE if several else OF_SEVERAL) for name in _changed(key, usual[key], now[key])]
     if idle:
         warn(f"no effect with {cameras}: {', '.join(idle)}")
+    if not options.uses_silhouettes:
+        unused = [name for name in ("background", "masks", "region", "silhouette") if getattr(options, name) != getattr(Options(), name)]
+        if unused:
+            warn(f"no effect with keypoints alone: {', '.join(unused)}")
     if options.label is not None and not options.masks:
         warn("no effect without ready silhouettes (--masks): label")
 

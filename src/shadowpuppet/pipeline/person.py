@@ -21,7 +21,6 @@ from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Finding, RecordingError
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.io.person import Person, read_person
 from shadowpuppet.io.recording import Reference
-from shadowpuppet.motion.limbs import status_in_words
 from shadowpuppet.motion.motion import Motion, MotionFrame
 from shadowpuppet.pipeline.findings.look import Look, Survey
 from shadowpuppet.pipeline.footage import CameraFrame, Footage
@@ -183,10 +182,9 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
         assert image is not None
         pose = np.full(len(self.body.skeleton.dofs), np.nan) if found.pose is None else np.asarray(found.pose)
         ignored = mask & self.picture.legs(pose) if found.pose is not None and self.tracker.settings.ignore_legs else None
-        status = status_in_words(found.status, self.body.landmark_names, found.limb_status)
-        return overlay_frame(image, mask, self.picture, pose, status=status, time=found.time, overlap=found.overlap, ignore=ignored,
-                             doubtful=doubtful_names(self.body, found.limb_status),
-                             last=None if last is None or last.pose is None else (last.pose, last.time))
+        (keypoints,) = frames.seen.keypoints or (None,)
+        return overlay_frame(image, mask, self.picture, pose, ignore=ignored, doubtful=doubtful_names(self.body, found.limb_status),
+                             last=None if last is None else last.pose, keypoints=keypoints)
 
 
 def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) -> MonocularSubject:

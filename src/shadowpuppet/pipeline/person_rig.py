@@ -34,10 +34,12 @@ from shadowpuppet.tracking.arm_colours import ColourCounts
 from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.multiview import Before, MultiviewDoubt
 from shadowpuppet.tracking.doubt.steps import Trail
-from shadowpuppet.tracking.multiview.height_estimation import FirstFrame, estimate_height
-from shadowpuppet.tracking.multiview.settings import for_rate, for_smeared
+from shadowpuppet.tracking.keypoints.definitions import landmarks_of
+from shadowpuppet.tracking.keypoints.stature import height_by_bones
+from shadowpuppet.tracking.multiview.height_estimation import FirstFrame, SeenHeight, estimate_height
+from shadowpuppet.tracking.multiview.settings import MultiviewSettings, for_rate, for_smeared
 from shadowpuppet.tracking.multiview.size_estimation import Front, dressed, estimate_sizes, shared_deviations, size_deviations
-from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
+from shadowpuppet.tracking.multiview.surface.visual_hull import NO_SURFACE, SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles
 from shadowpuppet.tracking.unexplained import Unexplained, left_out, looks_in
@@ -56,7 +58,7 @@ class HullObservation(NamedTuple):
     """Surface points of the visual hull."""
     seen: Seen
     people: int
-    """Number of cameras in which the silhouette may be a person's."""
+    """Number of cameras in which the silhouette may be a person's, or in which a detector found one if there are no silhouettes."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,7 +66,8 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
     """A fitted person seen by several cameras, and the tracker."""
 
     tracker: MultiviewTracker
-    hull: VisualHull
+    hull: VisualHull | None
+    """None if keypoints alone are evidence."""
     is_measured: bool = True
     """Whether the sizes are the person's own, not average ones."""
     front: Front | None = None
@@ -72,8 +75,11 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
     state_types = (MultiviewState, Particles, Unexplained, ColourCounts, Before, Trail)
 
     def observe(self, seen: Seen) -> HullObservation:
-        """Surface points of the visual hull of the masks, and what was seen."""
-        return HullObservation(self.hull.points(seen.masks), seen, sum(mask is not None and may_be_person(mask) for mask in seen.masks))
+        """Surface points of the visual hull of the masks, if they are evidence, and what was seen."""
+        if self.hull is None:
+            return HullObservation(NO_SURFACE, seen, sum(each is not None and len(each.person) > 0 for each in seen.keypoints))
+        people = sum(mask is not None and may_be_person(mask) for mask in seen.masks)
+        return HullObservation(self.hull.points(seen.masks), seen, people)
 
     def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed[HullObservation]]:
         """Observations of frame sets; another thread makes the next one while one is tracked."""
@@ -90,7 +96,7 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
         After None the first pose is searched for again, once two cameras see a person.
         """
         points, seen, people = observation
-        if people == 0 or (state is None and people < 2):
+        if people == 0 or (state is None and people < min(2, len(self.tracker.cameras))):
             return None
         if state is None:
             found = self.tracker.start(rng, points, seen.masks, facing=None if self.front is None else self.front.heading_in(points),
@@ -110,7 +116,9 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
 
     def doubt(self, state: MultiviewState, observation: HullObservation, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
         """Doubt about the estimate of a frame set."""
-        return self._doubt(state, observation.points, observation.seen.masks, seconds, before)
+        points, seen, _ = observation
+        keypoints = self.tracker.shown(points, seen.masks, seen.keypoints, state.pose)
+        return self._doubt(state, points, seen.masks, seconds, before, keypoints)
 
     @cached_property
     def _doubt(self) -> MultiviewDoubt:
@@ -127,7 +135,7 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
     @cached_property
     def pictures(self) -> list[Picture]:
         """How each camera sees the body."""
-        return [Picture(self.body, camera, camera.T_camera_world) for camera in self.hull.cameras]
+        return [Picture(self.body, camera, camera.T_camera_world) for camera in self.tracker.cameras]
 
 
 def fit_multiview(rng: np.random.Generator, survey: Survey, options: Options) -> MultiviewSubject:
@@ -135,7 +143,7 @@ def fit_multiview(rng: np.random.Generator, survey: Survey, options: Options) ->
     not usable."""
     rig, recording = survey.rig, survey.rig.recording
     check_body(options)
-    smeared = float(np.mean([each.smeared for each in survey.silhouettes]))
+    smeared = float(np.mean([each.smeared for each in survey.silhouettes])) if survey.silhouettes else 0.0
     options = replace(options, multiview=for_smeared(options.multiview, smeared))
     training = None if recording.training is None else read_motion(recording.training)
     return fit_in_views(rng, rig.cameras, survey.first.masks, options, rig.rate / options.every, recording.subject.height, training,
@@ -148,37 +156,53 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
     """Fit the person to `views`, masks by time and camera, and make the tracker for `rate` frames/s; `both_fronts` as in `estimate_sizes`.
     `keypoints`: of the same times and cameras; empty without any. Raises the errors of `fit_multiview`."""
     settings = options.multiview
-    hull = VisualHull(cameras, settings.hull)
+    cameras = [replace(camera, oriented=True) for camera in cameras]  # one that stands alone has a world of its own
+    hull = VisualHull(cameras, settings.hull) if options.uses_silhouettes else None
     known = familiar(rng, options, training, settings.body, rate)
-    first = [FirstFrame(hull.points(masks), masks, keypoints[n] if keypoints else ()) for n, masks in enumerate(views)]
+    first = [FirstFrame(NO_SURFACE if hull is None else hull.points(masks), masks, keypoints[n] if keypoints else ())
+             for n, masks in enumerate(views)]
     height, seen, shared, begin = options.height or height, None, None, 0
+    shown = "hulls" if options.uses_silhouettes else "keypoints"
     if options.person is not None:
         sizes, source = read_person(options.person, settings.body).sizes, str(options.person)
         spread = np.zeros(len(sizes.names()))
     elif known.sizes is not None:
-        sizes, source, spread = known.sizes, "training motion, and the hulls of the first seconds", size_deviations(known.sizes, shown=True)
+        sizes, source = known.sizes, f"training motion, and the {shown} of the first seconds"
+        spread = size_deviations(known.sizes, shown=True)
     else:
-        seen = None if height else estimate_height(rng, lambda tall: make_body(settings.body, dressed(average_sizes(settings.body, tall))),
-                                                   cameras, first, settings)
+        seen = _seen_height(rng, cameras, first, settings) if height is None else None
         tall, begin = (height or AVERAGE_HEIGHT, 0) if seen is None else seen
         sizes = dressed(average_sizes(settings.body, tall))
-        source = f"{'the height' if height else f'a height of {tall:.2f} m as seen'}, and the hulls of the first seconds"
+        source = f"{'the height' if height else f'a height of {tall:.2f} m as seen'}, and the {shown} of the first seconds"
         assert isinstance(sizes, BoneSizes)
         spread, shared = size_deviations(sizes, shown=False), None if height else shared_deviations(sizes)
-    library = known.poses if len(known.poses) else None
+        if len(cameras) == 1:  # which shows no length
+            spread, shared = np.zeros(len(sizes.names())), None
+    library, looks = known.poses if len(known.poses) else None, 0 if hull is None else looks_in(settings.patience, rate)
     person = estimate_sizes(rng, partial(make_body, settings.body), sizes, spread, cameras, first, settings, library,
-                            len(first) // 2 if settings.patience else 0, shared, begin, both_fronts)
+                            len(first) // 2 if looks else 0, shared, begin, both_fronts)
     prior = known.prior if settings.method == "hybrid" else None
-    summary: dict[str, object] = {"source": source, "overlap": round(person.overlap, 3), "residual": person.residual,
-                                  "frames": person.frames,
-                                  "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
-    tracker = MultiviewTracker(person.body, tuple(cameras), for_rate(settings, rate), prior, library,
-                               looks=looks_in(settings.patience, rate), carve=hull.points if settings.odd_camera else None, rate=rate)
+    fit = {"overlap": round(person.overlap, 3), "residual": person.residual} if options.uses_silhouettes else {}
+    summary = {"source": source, **fit, "frames": person.frames,
+               "sizes": dict(zip(person.sizes.names(), map(float, person.sizes.to_array()), strict=True))}
+    tracker = MultiviewTracker(person.body, tuple(cameras), for_rate(settings, rate), prior, library, looks=looks,
+                               carve=hull.points if settings.odd_camera and hull is not None else None, rate=rate)
     return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull, tracker=tracker,
                             doubts=(*_front_doubts(person.front), *(() if seen is None else _doubts(seen.height, person.overlap))),
                             front=person.front,
                             beside=tuple(_beside(each, picture.mask(person.pose), camera.size)
                                          for each, picture, camera in zip(person.unexplained, tracker.views.pictures, cameras)))
+
+
+def _seen_height(rng: np.random.Generator, cameras: Sequence[Camera], first: Sequence[FirstFrame],
+                 settings: MultiviewSettings) -> SeenHeight | None:
+    """The height that silhouettes ask for, or without them the bones between keypoints."""
+    made = partial(average_sizes, settings.body)
+    if any(mask is not None for each in first for mask in each.masks):
+        return estimate_height(rng, lambda tall: make_body(settings.body, dressed(made(tall))), cameras, first, settings)
+    body = make_body(settings.body, made(AVERAGE_HEIGHT))
+    height = height_by_bones(cameras, [each.keypoints for each in first if any(each.keypoints)], landmarks_of(body))
+    return None if height is None else SeenHeight(height, 0)
 
 
 def _front_doubts(front: Front | None) -> tuple[Finding, ...]:
@@ -192,8 +216,8 @@ def _front_doubts(front: Front | None) -> tuple[Finding, ...]:
 
 
 def _doubts(height: float, overlap: float) -> tuple[Finding, ...]:
-    """Doubts about an estimated height, metres, of a body that overlaps the silhouettes by `overlap`."""
-    if overlap >= SURE_OVERLAP:
+    """Doubts about an estimated height, metres, of a body that overlaps the silhouettes by `overlap`, NaN without any."""
+    if np.isnan(overlap) or overlap >= SURE_OVERLAP:
         return ()
     return (Finding.of("the person's height, {height:.2f} m, may be off by 20 cm: the body overlaps the silhouettes by {overlap:.2f} only; "
                        "furniture before the person, or a chair that is not in the empty scene, does that; --height gives the height",

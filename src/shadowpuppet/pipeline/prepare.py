@@ -56,6 +56,11 @@ MONOCULAR = Kind("Liu 2011, one camera", "tracker", survey_camera, fit_monocular
 MULTIVIEW = Kind("Ni 2008, {} cameras", "multiview", survey_rig, fit_multiview, STAGES)
 
 
+def is_for_rig(rig: Rig, options: Options) -> bool:
+    """Whether the tracker for several cameras tracks: it does with one, too, where keypoints alone are evidence."""
+    return rig.is_multiview or not options.uses_silhouettes
+
+
 class Prepared(NamedTuple, Generic[State, Observation, Before]):
     """The surveyed recording and the fitted person, before tracking."""
 
@@ -78,7 +83,7 @@ def look_at(recording: str | Path, options: Options | None = None, listener: Lis
     options = options or Options()
     rig = open_rig(recording, options)
     keypoints = look_at_keypoints(rig.footage)
-    look = (survey_rig(rig, options, listener=listener).look if rig.is_multiview
+    look = (survey_rig(rig, options, listener=listener).look if is_for_rig(rig, options)
             else prepare(generators(options)[0], rig, options, MONOCULAR, listener=listener).look)
     return replace(look, keypoints=keypoints)
 
@@ -89,7 +94,7 @@ def fit_person(recording: str | Path, file: str | Path, options: Options | None 
     """Measure the person and save the sizes. Raises a `ShadowPuppetError` if no person is found or the file cannot be written."""
     options = options or Options()
     rig, (rng, _) = open_rig(recording, options), generators(options)
-    if rig.is_multiview:
+    if is_for_rig(rig, options):
         prepared = prepare(rng, rig, options, MULTIVIEW, listener=listener)
     else:
         prepared = prepare(rng, rig, options, MONOCULAR, listener=listener)
@@ -101,10 +106,11 @@ def fit_person(recording: str | Path, file: str | Path, options: Options | None 
 def check_options(options: Options, rig: Rig) -> None:
     """Raise `SettingsError` for options that have no effect on a rig, `FormatError` for a person or a prior that cannot be read, before the
     recording is examined."""
-    check_used(options, rig.is_multiview)
+    several = is_for_rig(rig, options)
+    check_used(options, several)
     if options.person is not None:
-        read_person(options.person, (options.multiview if rig.is_multiview else options.tracker).body)
-    if options.prior is not None and rig.is_multiview:
+        read_person(options.person, (options.multiview if several else options.tracker).body)
+    if options.prior is not None and several:
         read_prior(options.prior)
 
 
@@ -112,7 +118,7 @@ def run_writer(rig: Rig, kind: Kind[State, Observation, Before], folder: str | P
     """The writer of a run's folder; `resume`: an earlier run there goes on."""
     body, recording = average_body(getattr(options, kind.settings).body), rig.recording
     info = {"recording": recording.path.resolve(), "method": kind.name(options.preset, len(rig.cameras)),
-            "cameras": list(rig.names) if rig.is_multiview else None, "settings": plain_options(options),
+            "cameras": list(rig.names) if is_for_rig(rig, options) else None, "settings": plain_options(options),
             "truth": recording.truth and recording.truth.resolve(), "begin": recording.begin or None, "end": recording.duration}
     return RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, Resuming(resume, rig.inputs))
 

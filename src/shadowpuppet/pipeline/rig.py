@@ -35,8 +35,12 @@ NEAR = 0.55
 LATE = 5
 """Number of sets without a frame of a camera after which the end of its film is reported: films rarely end with the same frame."""
 
-Segment = Callable[[CameraFrame], Segmented]
-"""Makes the silhouette of a camera's frame, as `Silhouettes.segmented` does."""
+Segment = Callable[[CameraFrame], Segmented | None]
+"""Makes the silhouette of a camera's frame, as `Silhouettes.segmented` does; None where silhouettes are no evidence."""
+
+
+def unsegmented(frame: CameraFrame) -> None:
+    """No silhouette: of films whose keypoints alone are evidence, or whose pictures alone are wanted."""
 
 
 def shown_in(found: Sequence[Segmented | None], keypoints: tuple[Keypoints | None, ...] = ()) -> Seen:
@@ -136,11 +140,13 @@ def open_rig(path: str | Path, options: Options) -> Rig:
     recording = open_recording(path, options)
     views = chosen_views(recording, options.camera)
     others = [source for view in recording.views if not any(view is each for each in views)
-              for source in (view.video, view.background, view.masks)]
+              for source in (view.video, view.background, view.masks, view.keypoints and view.keypoints.path)]
     if options.background is not None and len(views) > 1:
         raise SettingsError(f"background: found one for {len(views)} cameras, expected one each, background/<camera>.* in the recording")
     if (options.people or 1) > 1 and len(views) == 1:
         raise SettingsError(f"people: found {options.people} for one camera, expected 1: two calibrated cameras or more track several")
+    if (options.people or 1) > 1 and not options.uses_silhouettes:
+        raise SettingsError(f"people: found {options.people} with keypoints alone, expected 1: several people need silhouettes, too")
     if options.region is not None and len(views) > 1:
         raise SettingsError(f"region: found a region for {len(views)} cameras, expected it with one camera only (--camera)")
     return Rig(recording, tuple(camera_footage(recording, view, options) for view in views), inputs.without(others))
@@ -162,7 +168,8 @@ def _single_frames(rig: Rig, segment: Segment, ready: bool, every: int) -> Gener
             return
         decoded = time.perf_counter()
         found = segment(frame)
-        seen = Seen((found.mask,), codes=(colour_codes(found.image),))
+        seen = shown_in([found], keypoints=(frame.keypoints,))
+        seen = seen if found is None else seen._replace(codes=(colour_codes(found.image),))
         yield FrameSet(frame.time, (frame.image,), seen, decoded - start, time.perf_counter() - decoded)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample, spread_frames, take_sample
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.rig import Rig, Segment, unsegmented
 from shadowpuppet.silhouette import RecoveredScene, Segmenter, SilhouetteSettings, learn_background, ready_mask, recover_scene
 from shadowpuppet.silhouette.added import AddedParts, StillParts, find_still
 from shadowpuppet.silhouette.segmenter import Labelled, Segmented
@@ -98,6 +99,11 @@ class Silhouettes:
         out = np.zeros_like(mask)
         out[self.region] = mask[self.region]
         return out
+
+
+def segments_of(rig: Rig, silhouettes: Sequence[Silhouettes]) -> list[Segment]:
+    """Makes the silhouettes of each of a rig's films; none if keypoints alone are evidence."""
+    return [each.segmented for each in silhouettes] or [unsegmented] * len(rig.footage)
 
 
 def learn_silhouettes(footage: Footage, sample: Sample, options: Options, recovered: RecoveredScene | None = None,

@@ -123,7 +123,7 @@ class TrackedSubject(FittedPerson, ABC, Generic[State, Observation, Before]):
 
     @abstractmethod
     def draw(self, frames: FrameSet, found: MotionFrame, last: MotionFrame | None = None) -> Image:
-        """A frame of overlay.mp4, (H, W, 3), blue green red. `last`: the last frame with a pose, shown pale where this one has none."""
+        """A frame of overlay.mp4, (H, W, 3), blue green red. `last`: the last frame with a pose, dashed where this one has none."""
 
     def observations(self, frames: Iterable[FrameSet]) -> Generator[Observed[Observation]]:
         """Observations of frame sets, one after another."""

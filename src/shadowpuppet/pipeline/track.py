@@ -17,7 +17,17 @@ from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
-from shadowpuppet.pipeline.prepare import MONOCULAR, MULTIVIEW, Kind, Prepared, check_options, fit_survey, look_around, run_writer
+from shadowpuppet.pipeline.prepare import (
+    MONOCULAR,
+    MULTIVIEW,
+    Kind,
+    Prepared,
+    check_options,
+    fit_survey,
+    is_for_rig,
+    look_around,
+    run_writer,
+)
 from shadowpuppet.pipeline.progress import Listener, StageTimer, Summary, generators, json_text, judge, set_aside, summary, timings, tracked
 from shadowpuppet.pipeline.rig import FrameSet, Rig, open_rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore, SilhouetteCache
@@ -48,7 +58,7 @@ def track_recording(recording: str | Path, folder: str | Path, options: Options 
     options = options or Options()
     rig = open_rig(recording, options)
     listener = listener or Listener()
-    if rig.is_multiview:
+    if is_for_rig(rig, options):
         return run(rig, MULTIVIEW, folder, options, listener, cache, resume)
     return run(rig, MONOCULAR, folder, options, listener, cache, resume)
 
@@ -93,7 +103,7 @@ def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: L
         raise TrackingError(f"{survey.look.recording}: nobody is found in the silhouettes of {survey.census.number} people")
     if len(found) < min(survey.census.number, options.people or survey.census.number):
         warn(f"{survey.look.recording}: {survey.census.number} people were counted, {len(found)} could be followed: a person whom few "
-             "cameras show whole, or who is seen for less than a second, is not")
+             f"cameras show whole, or who is seen for less than a second, is not; if there are no more, give --people {len(found)}")
     first = read_run(person_folder(writer.folder, min(found)))
     if len(found) == 1:
         ((number, metrics),) = found.items()
@@ -120,6 +130,7 @@ def _track(writer: RunWriter, prepared: Prepared[State, Observation, Before], ki
             frames = _segmented(stack, survey, options, watch, cache, kept)
             for found in rows.repeated(frames):
                 watch.tracked(subject.drawn(found))
+            began = time.perf_counter()
             observed = stack.enter_context(closing(subject.observations(frames)))
             for now, observation, seconds in timer.each("wait", observed):
                 timer.add(decode=now.decoding, segment=now.segmenting, hull=seconds)

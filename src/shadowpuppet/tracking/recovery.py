@@ -10,15 +10,15 @@ import numpy as np
 SETTLE_CYCLES = 10
 """Number of estimation cycles on the same frame after a search."""
 OVERLAP_DROP = 0.2
-"""With several cameras, a fall of the overlap by more than this in a frame starts a search: wrong poses may overlap too much for `lost`."""
+"""With several cameras, a fall of the agreement by more than this in a frame starts a search: wrong poses may agree too much for `lost`."""
 
 
 class TrackerState(Protocol):
     """The fields of a tracker's state that the policy uses."""
 
     @property
-    def overlap(self) -> float:
-        """Intersection over union of the drawn estimate and the silhouettes."""
+    def agreement(self) -> float:
+        """How well the estimate agrees with what is seen, from 0 to 1: overlap with the silhouettes, or the keypoints' `support`."""
         ...
 
     @property
@@ -34,7 +34,7 @@ def track_or_recover(state: State, *, is_absent: bool, hold: Callable[[State], S
                      search: Callable[[], State], recover: bool, drop: float = np.inf) -> State:
     """The state after a frame. If the person is absent, the pose is held.
 
-    With `recover`, a search replaces tracking for a person who was absent; after a loss, or when the overlap falls by more than `drop`,
+    With `recover`, a search replaces tracking for a person who was absent; after a loss, or when the agreement falls by more than `drop`,
     the better of the two counts.
     """
     if is_absent:
@@ -42,10 +42,10 @@ def track_or_recover(state: State, *, is_absent: bool, hold: Callable[[State], S
     if state.status == "absent" and recover:
         return search()
     tracked = cycle(state)
-    if not recover or not (tracked.status == "lost" or tracked.overlap < state.overlap - drop):
+    if not recover or not (tracked.status == "lost" or tracked.agreement < state.agreement - drop):
         return tracked
     found = search()
-    return found if found.overlap > tracked.overlap else tracked
+    return found if found.agreement > tracked.agreement else tracked
 
 
 def settle(state: State, cycle: Callable[[State], State]) -> State:

@@ -127,7 +127,7 @@ def _shown(path: Path, film: FrameSource, step: float, grey: bool, rate: float |
         nonlocal n, longest
         before, time = clock.last, clock(frame)
         if n > 10 and longest < 1.1 * step + 0.001 and time - before > 1.5 * step:  # steady so far, to the millisecond
-            warn(f"{path}: between {before:.3f} and {time:.3f} s frames are missing")
+            warn(f"{path}: between {before:.3f} and {time:.3f} s frames are missing: film at a lower rate or size if that recurs")
         longest, n = max(longest, time - before), n + 1
         return wanted(time_shown())
 
@@ -143,7 +143,8 @@ def _shown(path: Path, film: FrameSource, step: float, grey: bool, rate: float |
         broken = f"the file ends, {film.duration:.3f} s were announced"
     if broken:
         of = f" of {film.count}" if film.count else ""
-        warn(f"{path}: broken off at frame {n}{of} ({clock.last + step:.3f} s): {broken}; the {n} frames before it are given")
+        warn(f"{path}: broken off at frame {n}{of} ({clock.last + step:.3f} s): {broken}; the {n} frames before it are given: "
+             "copy the film again if it was whole")
 
 
 def _declared_duration(container: InputContainer, stream: VideoStream) -> float:
@@ -222,7 +223,7 @@ class _Clock:
     def __call__(self, frame: Stamped) -> float:
         stamp, base = self._stamp(frame), frame.time_base
         if stamp is None or base is None:
-            self._warn(self.last + self.step, f"has no time; times are filled in at {1 / self.step:g} frames/s")
+            self._warn(self.last + self.step, f"has no time; times are filled in at {1 / self.step:g} frames/s (recording.toml: rate)")
             self.last += self.step
         else:
             self.zero = stamp if self.zero is None else self.zero
@@ -241,7 +242,8 @@ class _Clock:
         if time > self.last:
             return time
         self.bad_pts += 1
-        self._warn(self.last, f"is followed by {NOT_LATER}; times are moved so that they increase")
+        self._warn(self.last, f"is followed by {NOT_LATER}; times are moved so that they increase: convert the film to a constant rate if "
+                              "the motion jerks there")
         if self.last - time < LONGEST_STUTTER:  # later times are correct again
             return self.last + self.step / 2
         self.shift += self.last + self.step - time  # the clock restarted

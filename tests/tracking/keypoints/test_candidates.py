@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import actor
 import numpy as np
+import pytest
 
 from benchmarks.detector import EXACT, detected
 from shadowpuppet.body.whole_body import heading_column
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.keypoints.candidates import candidates, landmarks_with_exchanged, pose_at, triangulated_landmarks
+from shadowpuppet.tracking.keypoints.candidates import (
+    candidates,
+    landmarks_with_exchanged,
+    placed_by_rays,
+    pose_at,
+    triangulated_landmarks,
+)
 from shadowpuppet.tracking.keypoints.definitions import ARMS, LEGS, landmarks_of
 from shadowpuppet.tracking.keypoints.sights import NO_SIGHTS, Sights, sights_of
 
@@ -71,8 +78,20 @@ def test_without_hips_or_a_second_camera_there_is_no_pose():
     assert not len(candidates(BODY, MARKS, NO_SIGHTS))
 
 
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_a_body_is_moved_to_where_its_landmarks_are_on_their_rays(count):
+    away = POSE.copy()
+    away[:3] += (1.0, -2.0, 0.5)
+    found = placed_by_rays(BODY, np.stack([away, POSE]), MARKS, seen(places(), count))
+    assert np.abs(found - POSE).max() < 1e-4
+
+
 def test_both_sides_have_the_same_landmarks():
-    assert [name.replace("left", "right") for name in MARKS.names[::2]] == list(MARKS.names[1::2])
+    left = {name.removeprefix("left_") for name in MARKS.names if name.startswith("left_")}
+    assert left | {"nose"} == {name.removeprefix("right_") for name in MARKS.names if not name.startswith("left_")}
+    nose, ear = (MARKS.names.index(name) for name in ("nose", "left_ear"))
+    assert MARKS.mirrored[nose] == nose
+    assert MARKS.names[MARKS.mirrored[ear]] == "right_ear"
     assert landmarks_with_exchanged(MARKS, (ARMS, LEGS)).tolist() == MARKS.mirrored.tolist()
     own = [MARKS.names.index(name) for name in ("left_shoulder", "right_ankle")]
     assert np.abs(places()[own] - BODY.points(POSE[None], names=["left_shoulder", "right_ankle"])[0]).max() < 1e-12

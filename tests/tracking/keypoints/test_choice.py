@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import actor
 import numpy as np
+import pytest
 
 from benchmarks.detector import EXACT, detected
 from shadowpuppet.camera.keypoints import Keypoints
-from shadowpuppet.tracking.keypoints.choice import people_at, people_in
+from shadowpuppet.tracking.keypoints.choice import people_at, people_in, person_between
 from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.keypoints.front import front_of
 from shadowpuppet.tracking.keypoints.sights import OUTLYING, sights_of
+from shadowpuppet.tracking.keypoints.stature import height_by_bones
 
 BODY = actor.body()
 MARKS = landmarks_of(BODY)
@@ -39,6 +41,23 @@ def test_the_person_is_the_one_nearest_to_the_body_on_whichever_side():
     assert people_at(OWN[MARKS.mirrored], CAMERAS, both(), MARKS) == (1,) * len(CAMERAS)
     nobody = Keypoints(MARKS.names, np.zeros((0, len(MARKS.names), 2)), np.zeros((0, len(MARKS.names))), np.zeros(0, np.int64), "made")
     assert people_at(OWN, CAMERAS, [nobody, None, *both()[2:]], MARKS) == (None, None, 1, 1, 1)
+
+
+def test_without_silhouettes_the_person_is_one_whose_rays_meet_in_all_cameras():
+    keypoints, order = both(), [1, 0]
+    keypoints[2] = Keypoints(MARKS.names, keypoints[2].xy[order], keypoints[2].confidence[order], np.array([8, 7]), "made")
+    people, middle = person_between(CAMERAS, keypoints, MARKS)
+    assert people in ((0, 0, 1, 0, 0), (1, 1, 0, 1, 1))
+    assert np.abs(middle - (OTHER if people[0] == 0 else OWN).mean(0)).max() < 1e-3
+    alone = person_between(CAMERAS, [keypoints[0], *[None] * 4], MARKS)[0]
+    assert alone == (0, *[None] * 4)
+
+
+def test_the_height_follows_from_the_bones_between_landmarks():
+    frames = [detected(np.random.default_rng(0), CAMERAS, np.zeros(1), MARKS.names, OWN[None], EXACT)[0]] * 3
+    found = height_by_bones(CAMERAS, frames, MARKS)
+    assert found == pytest.approx(1.75, abs=0.03)
+    assert height_by_bones(CAMERAS[:1], [each[:1] for each in frames], MARKS) is None
 
 
 def test_points_outside_the_picture_and_missing_ones_are_no_sights():

@@ -23,7 +23,7 @@ from shadowpuppet.tracking.multiview import pose_search
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings, make_multiview_settings
-from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
+from shadowpuppet.tracking.multiview.surface.visual_hull import NO_SURFACE, SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import evaluate, gathered
 from shadowpuppet.tracking.resampling import normalise
@@ -434,6 +434,22 @@ def test_with_keypoints_a_walk_is_followed_at_least_as_well():
     for frame, keypoints in zip(seen, found_in()):
         states.append(of.step(rng, states[-1], *frame, keypoints=keypoints) if states else of.start(rng, *frame, keypoints=keypoints))
     assert np.median(errors(of, states, poses)) < 0.015
+
+
+@pytest.mark.parametrize(("cameras", "within"), [(5, 0.03), (2, 0.035), (1, 0.12)])
+def test_keypoints_alone_show_a_walk(cameras, within):
+    poses, _ = actor.filmed()
+    of = replace(tracker(), cameras=actor.cameras()[:cameras])
+    rng, states, masks = np.random.default_rng(0), [], [None] * cameras
+    for keypoints in (each[:cameras] for each in found_in()):
+        states.append(of.step(rng, states[-1], NO_SURFACE, masks, keypoints=keypoints) if states else
+                      of.start(rng, NO_SURFACE, masks, keypoints=keypoints))  # fmt: skip
+    assert np.median(errors(of, states, poses)) < within
+    assert {state.status for state in states} == {"tracked"}
+    assert np.isnan([state.overlap for state in states]).all()
+    assert min(state.support for state in states) > 0.9
+    gone = of.step(rng, states[-1], NO_SURFACE, masks, keypoints=[None] * cameras)
+    assert gone.status == "absent"
 
 
 def test_a_search_is_about_the_front_that_keypoints_show(monkeypatch):

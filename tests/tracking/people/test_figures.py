@@ -10,7 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from solids import Ellipsoid, ring, seen_by
 
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Seen
+from shadowpuppet.geometry import rigid
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.people.figures import EMPTY, NEW, ROWS, Figure, _height, _score, drawn, find_floor, find_people, telling
 from shadowpuppet.tracking.people.floor import (
@@ -291,6 +293,17 @@ def test_a_second_person_who_is_certain_counts_where_there_are_few_frames_of_the
     assert counted([1] * 22 + [2] * 2) == 1
     assert counted([1] * 22 + [2] * 2, share=0.0) == 2
     assert counted([1] * 23 + [2], share=0.0) == 1
+
+
+def test_places_beside_a_lens_are_outside_its_picture_without_a_warning():
+    """Their pixels are beyond single precision: a lens' formula grows with the seventh power."""
+    lens = Camera("cam", (160, 120), [[140, 0, 79.5], [0, 140, 59.5], [0, 0, 1]], [0.1, 0.1, 0, 0, 0.1],
+                  T_camera_world=rigid([[0, 1, 0], [0, 0, -1], [-1, 0, 0]], [0.0, 1.0, 3.0]))
+    ground = Ground((lens,), np.array([[3.0 - 1e-8, 1.0], [0.0, 0.0]]), 0.1)
+    assert np.abs(lens.project(figure_points(lens, ground.places[:1], np.zeros(1), np.zeros(1)))).max() > np.finfo(np.float32).max
+    beside, before = ground.at(0.0).pixels[:, 0, 0]
+    assert (beside == -1).all()
+    assert (before >= 0).any()
 
 
 def test_the_floor_is_bounded():

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.drawing import BLACK, WHITE, colour_of, draw_bone, in_colour, write_text
+from shadowpuppet.camera.captions import WHITE, strip
+from shadowpuppet.camera.drawing import BLACK, DASH, colour_of, draw_line, in_colour
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.geometry import Array
@@ -20,7 +21,7 @@ from shadowpuppet.motion.limbs import doubtful_joints
 from shadowpuppet.motion.metrics import LOST_ERROR
 from shadowpuppet.motion.motion import BLANK, JointTable
 from shadowpuppet.motion.synchronization import at_times, match, step_of
-from shadowpuppet.pipeline.footage import camera_footage, chosen_views, open_recording
+from shadowpuppet.pipeline.footage import camera_footage, chosen_views, open_recording, worked_size
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.overlay_video import grid_of
 from shadowpuppet.removed import of_earlier_run
@@ -92,36 +93,34 @@ def pictures(of: Evaluation, chosen: Sequence[ReportFrame]) -> tuple[dict[str, b
 
 
 def _of_overlay(film: Path, of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[str, Image]]:
-    """Frames of the run's overlay with the truth's bones; the rows of a single camera side by side."""
+    """Frames of the run's overlay with the truth's bones; the rows of a single camera side by side, without the words below."""
     from shadowpuppet.video import open_frames
 
-    cameras, last = of.cameras, max(wanted)
+    options, last = _options(of), max(wanted)
+    cameras = [camera.resized(worked_size(camera.size, options.max_size)) for camera in of.cameras]
     for n, frame in enumerate(open_frames(film)):
         if n in wanted:
             image, places = np.array(in_colour(frame.image)), _truth_at(of, n)
-            if len(cameras) <= 1:
-                rows = [_scaled(row, height=max(len(row), MIN_HEIGHT)) for row in np.split(image[: len(image) // 3 * 3], 3)]
+            high = cameras[0].size[1] if cameras else len(image) // 3
+            if len(cameras) <= 1 and len(image) >= 3 * high:
+                rows = [_scaled(image[row * high :][:high], height=max(high, MIN_HEIGHT)) for row in range(3)]
                 if cameras and places is not None:
                     draw_bones(rows[2], cameras[0], places)
-                image = np.concatenate(rows, axis=1)
+                yield wanted[n], np.concatenate(rows, axis=1)
             else:
-                image = _of_grid(image, of, n)
-            yield wanted[n], image
+                yield wanted[n], _of_grid(image, of, cameras, n)
         if n >= last:
             return
 
 
-def _of_grid(image: Image, of: Evaluation, frame: int) -> Image:
+def _of_grid(image: Image, of: Evaluation, cameras: Sequence[Camera], frame: int) -> Image:
     """The person cut out of the overlay of several cameras, with the truth's bones."""
-    columns, rows, _ = grid_of([camera.size for camera in of.cameras])
-    image = _scaled(image, height=max(image.shape[0], 2 * MIN_HEIGHT * rows))  # so that lines are thin
-    height, width = image.shape[0] // rows, image.shape[1] // columns
-    tiles = [image[y * height : (y + 1) * height, x * width : (x + 1) * width] for y in range(rows) for x in range(columns)]
-    truth = _truth_at(of, frame)
-    for tile, camera in zip(tiles, of.cameras):
+    grid, truth = grid_of(cameras), _truth_at(of, frame)
+    tiles = [_scaled(image[grid.place(n)], height=max(grid.height, 2 * MIN_HEIGHT)) for n in range(len(cameras))]  # so that lines are thin
+    for tile, camera in zip(tiles, cameras):
         if truth is not None:
             draw_bones(tile, camera, truth)
-    return _side_by_side(tiles[: len(of.cameras)], of.cameras, [table for table, _ in _tables(of, frame)])
+    return _side_by_side(tiles, cameras, [table for table, _ in _tables(of, frame)])
 
 
 def _side_by_side(images: Sequence[Image], cameras: Sequence[Camera], tables: Sequence[JointTable]) -> Image:
@@ -132,17 +131,17 @@ def _side_by_side(images: Sequence[Image], cameras: Sequence[Camera], tables: Se
     cut = []
     for n in chosen:
         image = _scaled(np.ascontiguousarray(images[n][boxes[n] or ...]), height=MIN_HEIGHT)
-        write_text(image, cameras[n].name, 0, WHITE, size=MIN_HEIGHT)
-        cut.append(image)
-    return np.concatenate(cut, axis=1)
+        cut.append((image, strip(image.shape[1], [[(cameras[n].name, WHITE)]])))
+    high = max(len(name) for _, name in cut)
+    return np.concatenate([np.concatenate([np.pad(name, ((0, high - len(name)), (0, 0), (0, 0))), image]) for image, name in cut], axis=1)
 
 
 def _of_recording(of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[str, Image]]:
     """Frames of the recording, up to four cameras side by side, with the run's bones and the truth's."""
-    path, settings = of.run.info.get("recording"), of.run.settings
+    path = of.run.info.get("recording")
     if not isinstance(path, str) or not Path(path).exists():
         raise ShadowPuppetError(f"the run has no overlay.mp4, and its recording, {path}, is not there")
-    options = make_options(of_earlier_run(settings)) if settings else Options()
+    options = _options(of)
     recording = open_recording(path, options)
     views = chosen_views(recording, options.camera)
     motion = of.run.motion
@@ -162,6 +161,11 @@ def _of_recording(of: Evaluation, wanted: Mapping[int, str]) -> Iterator[tuple[s
             yield wanted[frame], _side_by_side([*images.values()], [*images], [table for table, _ in _tables(of, frame)])
 
 
+def _options(of: Evaluation) -> Options:
+    """The settings of the run."""
+    return make_options(of_earlier_run(of.run.settings)) if of.run.settings else Options()
+
+
 def _nearest_images(shots: Iterator, times: Array, frames: list[int]) -> Iterator[tuple[int, Image]]:
     """Images nearest to the times of frames, in increasing order."""
     held, waiting = None, list(frames)
@@ -178,15 +182,16 @@ def _nearest_images(shots: Iterator, times: Array, frames: list[int]) -> Iterato
 
 def draw_bones(image: Image, camera: Camera, places: JointTable, own: bool = False, doubtful: Container[str] = ()) -> None:
     """Draw the bones of one frame into a picture (H, W, 3) of a camera, at any size; `own`: the run's, in the sides' colours, those to
-    `doubtful` joints dashed and pale; else thin and white."""
+    `doubtful` joints dashed; else thin and white."""
     pixels = dict(zip(places.names, _pixels(image, camera, places)))
     unit = image.shape[0] / 400
     for a, b in BONES:
         ends = [pixels[name] for name in (a, b) if name in pixels]
         if len(ends) < 2 or not np.isfinite(ends).all():
             continue
-        for ink, extra in ((BLACK, 2), (colour_of(b, doubtful) if own else WHITE, 0)):
-            draw_bone(image, ends[0], ends[1], ink, max(1, round((4 if own else 1.6) * unit)) + extra, own and b in doubtful)
+        for ink, extra in ((BLACK, 2), (colour_of(b) if own else WHITE, 0)):
+            width = max(1, round((4 if own else 1.6) * unit))
+            draw_line(image, np.array(ends), ink, width + extra, DASH * width * (own and b in doubtful))
 
 
 def _pixels(image: Image, camera: Camera, places: JointTable) -> Array:

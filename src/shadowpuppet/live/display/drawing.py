@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shadowpuppet.camera.drawing import SILHOUETTE_ONLY, draw_skeleton
+from shadowpuppet.camera.drawing import SILHOUETTE_ONLY, draw_person
 from shadowpuppet.live.display.view import SessionState
 
 if TYPE_CHECKING:
@@ -17,10 +17,8 @@ if TYPE_CHECKING:
 
 MIN_SIDE, MAX_SIDE = 640, 960
 """Limits of the picture's longer side, pixels; lines on smaller pictures would look coarse."""
-BODY_COLOUR = (0, 159, 230)
-"""Blue green red."""
-DIM, TINT = 0.45, 0.15
-"""Brightness of a picture without tracking, and opacity of the body's colour."""
+DIM = 0.45
+"""Brightness of a picture without tracking."""
 
 
 def drawn(view: SessionState) -> Image | None:
@@ -35,7 +33,7 @@ def drawn(view: SessionState) -> Image | None:
     if view.trouble or view.phase in ("learning", "measuring"):
         out = np.asarray(cv2.convertScaleAbs(out, alpha=DIM), np.uint8)
     if view.picture is not None and view.pose is not None:
-        _draw_body(out, view)
+        draw_person(out, _scaled(view.picture, size), view.pose, view.doubtful)
     if view.mask is not None:
         _draw_outline(out, view.mask, size)
     return out
@@ -52,15 +50,6 @@ def _shown_size(size: Size) -> Size:
     longest = max(size)
     scale = min(max(longest, MIN_SIDE), MAX_SIDE) / longest
     return round(size[0] * scale), round(size[1] * scale)
-
-
-def _draw_body(out: Image, view: SessionState) -> None:
-    assert view.picture is not None
-    assert view.pose is not None
-    picture = _scaled(view.picture, (out.shape[1], out.shape[0]))
-    body = picture.mask(view.pose)
-    out[body] = (out[body] * (1 - TINT) + np.array(BODY_COLOUR) * TINT).astype(np.uint8)
-    draw_skeleton(out, picture, view.pose, view.doubtful)
 
 
 @lru_cache(maxsize=2)

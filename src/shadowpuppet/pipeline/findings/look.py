@@ -160,7 +160,7 @@ class Survey:
 
     rig: Rig
     silhouettes: tuple[Silhouettes, ...]
-    """For each camera, the silhouettes used for tracking."""
+    """For each camera, the silhouettes used for tracking; empty if keypoints alone are."""
     clean: tuple[Silhouettes, ...]
     """For each camera, the silhouettes used for measuring the person; the same as `silhouettes` if these are clean."""
     first: FirstSeconds

@@ -13,7 +13,7 @@ from shadowpuppet.errors import ShadowPuppetWarning
 from shadowpuppet.pipeline.findings.look import FirstSeconds
 from shadowpuppet.pipeline.footage import CameraFrame, Opening, Sample
 from shadowpuppet.pipeline.rig import Rig, shown_in, synchronized_frames
-from shadowpuppet.pipeline.silhouettes import Silhouettes
+from shadowpuppet.pipeline.silhouettes import Silhouettes, segments_of
 from shadowpuppet.threads import MadeOnDemand, usable_cores
 
 OPENING, OPENED = 2.0, 40
@@ -31,7 +31,7 @@ def first_seconds(rig: Rig, silhouettes: Sequence[Silhouettes], samples: Sequenc
     """Silhouettes of the opening's frame sets, of the frames that the samples kept of it; films that are not in step are read once more,
     with their `ready` silhouettes if these are used."""
     kept = kept_sets(rig, samples, opening)
-    return _read_sets(rig, silhouettes, opening, ready) if kept is None else _segmented(rig, silhouettes, kept)
+    return read_sets(rig, silhouettes, opening, ready) if kept is None else _segmented(rig, silhouettes, kept)
 
 
 def kept_sets(rig: Rig, samples: Sequence[Sample], opening: Opening) -> list[tuple[CameraFrame, ...]] | None:
@@ -61,11 +61,11 @@ def _segmented(rig: Rig, silhouettes: Sequence[Silhouettes], sets: Sequence[tupl
                         keypoints=[tuple(frame.keypoints for frame in frames) for frames in sets])
 
 
-def _read_sets(rig: Rig, silhouettes: Sequence[Silhouettes], opening: Opening, ready: bool) -> FirstSeconds:
+def read_sets(rig: Rig, silhouettes: Sequence[Silhouettes], opening: Opening, ready: bool) -> FirstSeconds:
+    """As `first_seconds`, of films that are read; `silhouettes`: empty without."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShadowPuppetWarning)  # a film that breaks off is reported when the run comes to it
-        frames = synchronized_frames(rig, [each.segmented for each in silhouettes], ready=ready, every=opening.every,
-                                     threads=usable_cores())
+        frames = synchronized_frames(rig, segments_of(rig, silhouettes), ready=ready, every=opening.every, threads=usable_cores())
         sets = [(each.time, each.seen) for each in islice(frames, opening.number)]
     sets = [each for each in sets if each[0] <= rig.recording.begin + opening.seconds] or sets[:1]
     return FirstSeconds([time for time, _ in sets], [seen.masks for _, seen in sets], shadows=[seen.shadows for _, seen in sets],

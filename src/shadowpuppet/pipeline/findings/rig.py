@@ -23,6 +23,7 @@ from shadowpuppet.pipeline.findings.delays import delay_cautions
 from shadowpuppet.pipeline.findings.film import of_several, survey_films
 from shadowpuppet.pipeline.findings.look import CameraLook, FilmSurvey, FirstSeconds, RigLook, Survey
 from shadowpuppet.pipeline.findings.opening import OPENING, first_seconds, opening_of
+from shadowpuppet.pipeline.findings.rig_by_keypoints import survey_keypoints
 from shadowpuppet.pipeline.findings.scale import error_in, moments_of
 from shadowpuppet.pipeline.findings.upright import up_caution
 from shadowpuppet.pipeline.footage import Footage
@@ -51,6 +52,8 @@ RATES, LENGTHS = 0.02, 0.1
 def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, films: tuple[FilmSurvey, ...] = ()) -> Survey:
     """Examine each camera's film, and the first seconds of all together; `films`: the films, if they were examined again. Raises a
     `ShadowPuppetError` if something cannot be used."""
+    if not options.uses_silhouettes:
+        return survey_keypoints(rig, options, listener)
     steps = Steps(listener, rig.names, again=bool(films))
     apart = films = films or survey_films(rig, options, steps)
     silhouettes = tuple(film.silhouettes for film in films)

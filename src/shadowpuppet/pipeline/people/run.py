@@ -22,6 +22,7 @@ from shadowpuppet.io.inputs.inputs import NO_INPUTS, Resuming
 from shadowpuppet.io.people import open_places, person_folder, write_place
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import RunWriter, write_metrics
+from shadowpuppet.motion.limbs import status_in_words
 from shadowpuppet.motion.motion import BLANK, Motion, MotionFrame
 from shadowpuppet.pipeline.findings.look import RigLook, Survey
 from shadowpuppet.pipeline.findings.verdict import verdict_of_run
@@ -51,7 +52,7 @@ from shadowpuppet.pipeline.progress import (
 )
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.silhouette_cache import MaskStore
-from shadowpuppet.pipeline.stages.show import Draw, show_run
+from shadowpuppet.pipeline.stages.show import Drawing, show_run
 from shadowpuppet.pipeline.subject import joint_names
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
@@ -130,13 +131,16 @@ class PeopleRun:
         warn_of_set_aside(self.metrics.get("set_aside", []))
         return found
 
-    def _drawings(self, group: Group, people: PeopleState) -> Iterator[Draw]:
-        """Draws all people's motions in each frame set."""
+    def _drawings(self, group: Group, people: PeopleState) -> Iterator[Drawing]:
+        """All people's motions in each frame set."""
         found: dict[float, list[tuple[int, MotionFrame, Sequence[Picture]]]] = {time: [] for time in self.times}
         for number, writer in self.writers.items():
             for frame in writer.motion.frames():
                 found[frame.time].append((number, frame, group.subject(people.people[number - 1].sizes_at(frame.time)).pictures))
-        yield from (partial(overlay_of_people, people=each) for each in found.values())
+        for moment, each in found.items():
+            said = [f"person {number} {status_in_words(frame.status, pictures[0].body.landmark_names, frame.limb_status)}"
+                    for number, frame, pictures in each]  # fmt: skip
+            yield partial(overlay_of_people, cameras=self.rig.cameras, people=each), f"{moment:.2f} s: {'; '.join(said) or 'no person yet'}"
 
     def _finished(self, number: int, truth: Path | None) -> dict[str, Any]:
         """The metrics of a person's finished run, written into its folder."""
@@ -209,6 +213,7 @@ class PeopleRun:
                     self.store.add(now.time, seen)
                 if (known := next(earlier, None)) is not None:
                     judged(*known)
+                    began = time.perf_counter()
                     continue
                 timer.add(decode=now.decoding, segment=now.segmenting, hull=now.carving)
                 with timer.time("hull"):

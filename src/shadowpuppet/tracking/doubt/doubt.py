@@ -73,10 +73,14 @@ def pose_deviations(skeleton: Skeleton, points: Points, pose: Array, sd: Array, 
     number = len(pose)
     moved = points(np.concatenate([pose[None], pose + STEP * np.eye(number)]))
     jacobian = ((moved[1:] - moved[0]) / STEP / sd).reshape(number, -1)
-    low, high = skeleton.limits
-    width = np.where(np.isfinite(high - low), (high - low) / np.sqrt(12), UNBOUNDED)
-    width = np.maximum(width, STEP)
+    width = limit_deviations(skeleton.limits)
     return np.minimum(factors * np.sqrt(np.diag(np.linalg.inv(jacobian @ jacobian.T + np.diag(1 / width**2)))), width)
+
+
+def limit_deviations(limits: tuple[Array, Array]) -> Array:
+    """Standard deviations (D,) of degrees of freedom of which only the limits, lowest and highest (D,), are known."""
+    low, high = limits
+    return np.maximum(np.where(np.isfinite(high - low), (high - low) / np.sqrt(12), UNBOUNDED), STEP)
 
 
 def limb_statuses(limits: Mapping[str, float], names: Sequence[str], sd: Array, evidence: Evidence, status: str) -> tuple[str, ...]:

@@ -49,7 +49,7 @@ def limb_of_part(part: str) -> str:
 
 
 def doubtful_names(body: Body, statuses: Sequence[str] | None) -> frozenset[str]:
-    """Names of the landmarks and shape parts of a body's limbs of a status of `DOUBTFUL`, which are drawn dashed and pale. `statuses`: one
+    """Names of the landmarks and shape parts of a body's limbs of a status of `DOUBTFUL`, which are drawn dashed. `statuses`: one
     for each limb of the body; None: all vouched for."""
     limbs = doubtful_limbs(body.landmark_names, statuses)
     return doubtful_joints(body.landmark_names, statuses) | {part for part in body.parts if limb_of_part(part) in limbs}

@@ -18,9 +18,11 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
 from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
+from shadowpuppet.tracking.doubt.keypoints import keypoint_view
 from shadowpuppet.tracking.doubt.limbs import levers_of, limb_of_part
 from shadowpuppet.tracking.doubt.steps import CONSTANT, Trail, stillness, surprise
 from shadowpuppet.tracking.frozen import same_silhouette
+from shadowpuppet.tracking.multiview.keypoint_evidence import KeypointEvidence
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.resampling import normalise
@@ -60,21 +62,23 @@ class MultiviewDoubt:
     tracker: MultiviewTracker
 
     def __call__(self, state: MultiviewState, surface: SurfacePoints, masks: Sequence[Mask | None], seconds: float,
-                 before: Before | None) -> tuple[Doubt, Before]:
-        """Doubt about the estimate from surface points and masks (H, W) at a time (s); and what the next frame needs."""
+                 before: Before | None, keypoints: KeypointEvidence | None = None) -> tuple[Doubt, Before]:
+        """Doubt about the estimate from surface points and masks (H, W) at a time (s), and keypoints; and what the next frame needs."""
         body = self.tracker.body
-        evidence, now = self.evidence(state, surface, masks, seconds, before)
-        return state_doubt("multiview", evidence, self.names, body.skeleton, body.points, state.pose, state.status, np.eye(3)), now
+        evidence, now = self.evidence(state, surface, masks, seconds, before, keypoints)
+        kind = kind_of(masks, keypoints)
+        return state_doubt(kind, evidence, self.names, body.skeleton, body.points, state.pose, state.status, np.eye(3)), now
 
     def evidence(self, state: MultiviewState, surface: SurfacePoints, masks: Sequence[Mask | None], seconds: float,
-                 before: Before | None) -> tuple[Evidence, Before]:
+                 before: Before | None, keypoints: KeypointEvidence | None = None) -> tuple[Evidence, Before]:
         """What the frame shows about the accuracy of the estimate from surface points and masks (H, W) at a time (s); and what the next
         frame needs.
 
         Of every joint there are: a constant; the particles' spread; of its limb, the surface near it that no part explains, the share
         outside a silhouette, the share without surface points, and the share that few cameras see, times the joint's lever, and the
         distance of the surface that its parts explain; how far the joint left its course; the misfit of the whole body; silhouettes that do
-        not change; and the distance to its counterpart on the other side, if they were close within the last second.
+        not change; and the distance to its counterpart on the other side, if they were close within the last second. Where keypoints show
+        a limb, what silhouettes do not show of it counts less; and there are the components of `keypoint_view`.
         """
         body, levers = self.tracker.body, levers_of(self.names)
         points = body.points(state.pose[None])[0]
@@ -83,15 +87,20 @@ class MultiviewDoubt:
         apart = self._apart(points, seconds, before)
         weights = normalise(state.particles.log_weights)
         spread = np.sqrt(np.einsum("n,nla->la", weights, (body.points(state.particles.poses) - points) ** 2))
-        shares = self._limb_shares(state.pose, surface, masks)
-        by_joint = shares[self._limbs_of_joints].T
-        columns = dict(zip(("bare", "unexplained", "outside", "unseen"), by_joint[:4] * levers)) | {"residual": by_joint[4]}
-        columns |= {"constant": np.full(len(points), CONSTANT), "misfit": np.fmax(1 - state.overlap - GOOD_MISFIT, 0) * levers,
-                    "still": stillness(still) * levers, "surprise": surprise(points, seconds, trail)}
-        found = {name: np.repeat(values[:, None], 3, axis=1) for name, values in columns.items()} | {"spread": spread}
-        other = np.abs(points - points[self.counterparts]) * (apart < CROSSING)[:, None]
-        evidence = Evidence(found | {"swapped": other}, dict(zip(LIMBS, shares[:, 0].tolist())))
-        return evidence, Before(seconds, trail.with_frame(seconds, points), tuple(masks), still, apart)
+        found = {"spread": spread} | _along_axes({"constant": np.full(len(points), CONSTANT), "surprise": surprise(points, seconds, trail)})
+        unseen = np.ones(len(LIMBS))
+        if keypoints is not None:
+            shown = keypoint_view(body, state.pose, keypoints)
+            found, unseen = found | shown.components, 1 - shown.known
+        if keypoints is None or any(mask is not None for mask in masks):
+            shares = self._limb_shares(state.pose, surface, masks)
+            shares[:, :4] *= unseen[:, None]
+            by_joint, unseen = shares[self._limbs_of_joints].T, shares[:, 0]
+            columns = dict(zip(("bare", "unexplained", "outside", "unseen"), by_joint[:4] * levers)) | {"residual": by_joint[4]}
+            columns |= {"misfit": np.fmax(1 - state.overlap - GOOD_MISFIT, 0) * levers, "still": stillness(still) * levers}
+            found |= _along_axes(columns) | {"swapped": np.abs(points - points[self.counterparts]) * (apart < CROSSING)[:, None]}
+        now = Before(seconds, trail.with_frame(seconds, points), tuple(masks), still, apart)
+        return Evidence(found, dict(zip(LIMBS, unseen.tolist()))), now
 
     def _limb_shares(self, pose: Array, surface: SurfacePoints, masks: Sequence[Mask | None]) -> Array:
         """For each of `LIMBS`: the share of it without surface points, the points near it that no part explains over those that its
@@ -174,6 +183,11 @@ class MultiviewDoubt:
         return areas / areas.sum()
 
 
+def _along_axes(columns: dict[str, Array]) -> dict[str, Array]:
+    """Components (L,) as they are along each of the three axes, (L, 3)."""
+    return {name: np.repeat(values[:, None], 3, axis=1) for name, values in columns.items()}
+
+
 @kernel
 def _look_up(points, limbs, T, lens, mask, seen, out):  # pragma: no cover
     """Count the points (P, 3) of each limb that are in the picture into `seen` (5,), and those outside the mask (H, W) into `out` (5,)."""
@@ -182,6 +196,13 @@ def _look_up(points, limbs, T, lens, mask, seen, out):  # pragma: no cover
         if 0 <= x < mask.shape[1] and 0 <= y < mask.shape[0]:
             seen[limbs[p]] += 1
             out[limbs[p]] += not mask[y, x]
+
+
+def kind_of(masks: Sequence[Mask | None], keypoints: KeypointEvidence | None) -> str:
+    """The calibrated model of doubt by what is seen: `multiview`, `keypoints`, `keypoints_one` of one camera, or `both`."""
+    if keypoints is None or any(mask is not None for mask in masks):
+        return "multiview" if keypoints is None else "both"
+    return "keypoints" if keypoints.cameras > 1 else "keypoints_one"
 
 
 def count_still(before: Before | None, masks: Sequence[Mask | None]) -> int:

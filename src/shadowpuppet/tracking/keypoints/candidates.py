@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.ik_initial_guess import initial_poses
 from shadowpuppet.motion.motion import JointTable
@@ -57,6 +58,20 @@ def pose_at(body: Body, landmarks: Landmarks, places: Array, last: Array | None 
         kept = np.array([dof.joint in lost or dof.joint == "head" or dof.joint.endswith("_ankle") for dof in body.skeleton.dofs])
         pose[kept] = last[kept]
     return pose
+
+
+def placed_by_rays(body: Body, poses: Array, landmarks: Landmarks, sights: Sights) -> Array:
+    """Poses (N, D) moved to where their landmarks are nearest to the rays, in least squares; those in front of all cameras alone. One
+    camera tells the distance by the size of the person in the picture."""
+    moved, place = poses.copy(), body.skeleton.dof_indices(GLOBAL_DOFS[:3])
+    moved[:, place] = 0.0
+    points = body.skeleton.points(moved, landmarks.joints, landmarks.places)[:, sights.landmarks]
+    weighed = sights.across * ((1 - sights.outlying) / sights.squares)[:, None, None]
+    tells = np.einsum("mij,mik->jk", sights.across, weighed)
+    asked = np.einsum("mij,mik,nmk->nj", sights.across, weighed, sights.origins - points)
+    moved[:, place] = np.linalg.solve(tells + 1e-9 * np.trace(tells) * np.eye(3), asked.T).T
+    before = ((points + moved[:, None, place] - sights.origins) * sights.rays).sum(2) > 0
+    return moved[before.all(1)]
 
 
 def candidates(body: Body, landmarks: Landmarks, sights: Sights, last: Array | None = None) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.keypoints.candidates import triangulated_landmarks
 from shadowpuppet.tracking.keypoints.definitions import Landmarks
 from shadowpuppet.tracking.keypoints.sights import NEAR, is_inside, sights_of
 
@@ -43,3 +45,30 @@ def people_at(points: Array, cameras: Sequence[Camera], keypoints: Sequence[Keyp
         sights = sights_of(cameras, keypoints, chosen, landmarks, middle)
         np.add.at(scores[person], sights.cameras, 1 / (1 + sights.squares_from(points, landmarks) / NEAR**2))
     return tuple(int(each.argmax()) if each.any() else None for each in scores.T) if number else (None,) * len(cameras)
+
+
+def person_between(cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None], landmarks: Landmarks) -> tuple[People, Array]:
+    """The person whose rays meet best: an index for each camera, and the middle (3,) of the landmarks, world. The two pictures with the
+    most rays to common points begin, and the other cameras' persons nearest to these points follow."""
+    number, middle = len(cameras), np.mean([camera.centre for camera in cameras], axis=0)
+    seen = [(n, person) for n, each in enumerate(keypoints) if each is not None for person in range(len(each.person))]
+
+    def met(*chosen: tuple[int, int]) -> tuple[float, Array]:
+        """How many rays of persons, by camera and index, meet, and where (K, 3)."""
+        people = tuple(dict(chosen).get(n) for n in range(number))
+        sights = sights_of(cameras, keypoints, people, landmarks, middle)
+        places = triangulated_landmarks(sights, landmarks)
+        known = np.asarray(np.isfinite(places).all(1))
+        away = np.where(known[sights.landmarks], sights.squares_from(np.nan_to_num(places), landmarks), np.inf)
+        return float((1 / (1 + away / NEAR**2)).sum()), places
+
+    pairs = [pair for pair in combinations(seen, 2) if pair[0][0] != pair[1][0]]
+    if not pairs:
+        return tuple(next((person for m, person in seen if m == n), None) for n in range(number)), middle
+    first = max(pairs, key=lambda pair: met(*pair)[0])
+    places = met(*first)[1]
+    if not np.isfinite(places).all(1).any():
+        return (None,) * number, middle
+    middle = np.nanmean(places, axis=0)
+    others = people_at(np.where(np.isfinite(places), places, middle), cameras, keypoints, landmarks)
+    return tuple(dict(first).get(n, other) for n, other in enumerate(others)), middle

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.skeleton import SIDES
+from shadowpuppet.body.skeleton import other_side
+from shadowpuppet.camera.keypoints import MIDDLE
 from shadowpuppet.geometry import Array
 
 ARMS, LEGS = range(2)
@@ -21,10 +22,10 @@ ARMS, LEGS = range(2)
 
 
 class Definition(NamedTuple):
-    """A landmark that both sides have."""
+    """A landmark of a detector: one that both sides have, or in the middle."""
 
     landmark: str
-    """The body's own, which lies at the same place but for `offset`."""
+    """The body's own, without its side, which lies at the same place but for `offset`."""
     limbs: int
     """`ARMS` or `LEGS`."""
     deviation: float
@@ -37,9 +38,10 @@ DEFINITIONS = {
     "shoulder": Definition("shoulder", ARMS, 0.015), "elbow": Definition("elbow", ARMS, 0.015), "wrist": Definition("wrist", ARMS, 0.015),
     "hip": Definition("hip", LEGS, 0.03), "knee": Definition("knee", LEGS, 0.015), "ankle": Definition("ankle", LEGS, 0.015),
     "heel": Definition("heel", LEGS, 0.03), "big_toe": Definition("toe", LEGS, 0.03),
+    "ear": Definition("head", ARMS, 0.02, (0.0, 0.075, 0.0)), "nose": Definition("head", ARMS, 0.02, (0.1, 0.0, 0.0)),
 }  # fmt: skip
 """By a landmark's name without its side. What lies in flesh, the hips, or on the sole of our bodies and above it in pictures, is less
-certain."""
+certain; ears and nose lie half a head's width and depth beside its middle."""
 
 
 class Landmarks(NamedTuple):
@@ -71,13 +73,13 @@ NO_LANDMARKS = Landmarks((), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0
 @lru_cache(64)
 def landmarks_of(body: Body) -> Landmarks:
     """The landmarks of a whole body that its own are the places of."""
-    known = {name: each for name, each in DEFINITIONS.items() if f"left_{each.landmark}" in body.landmarks}
-    names = tuple(f"{side}_{name}" for name in known for side in SIDES)
-    placed = [_placed(body, f"{side}_{each.landmark}", np.array(each.offset) * (1, 1 if side == "left" else -1, 1))
-              for each in known.values() for side in SIDES]
+    known = {f"{prefix}{name}": (each, own, (1, -1 if prefix == "right_" else 1, 1)) for name, each in DEFINITIONS.items()
+             for prefix in (("",) if name in MIDDLE else ("left_", "right_"))
+             for own in (f"{prefix}{each.landmark}", each.landmark) if own in body.landmarks}  # fmt: skip
+    placed = [_placed(body, own, np.multiply(each.offset, mirror)) for each, own, mirror in known.values()]
     joints, places = np.array([joint for joint, _ in placed], np.int64), np.array([place for _, place in placed], float).reshape(-1, 3)
-    limbs, deviations = (np.array([each[n] for each in known.values()]).repeat(2) for n in (1, 2))
-    return Landmarks(names, joints, places, np.arange(len(names)) ^ 1, limbs.astype(np.int64), deviations.astype(float))
+    limbs, deviations = np.array([each.limbs for each, *_ in known.values()], np.int64), [each.deviation for each, *_ in known.values()]
+    return Landmarks(tuple(known), joints, places, np.array(other_side(list(known)), np.int64), limbs, np.array(deviations, float))
 
 
 def _placed(body: Body, landmark: str, offset: Array) -> tuple[int, Array]:

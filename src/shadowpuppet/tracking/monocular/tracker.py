@@ -66,6 +66,11 @@ class State(NamedTuple):
     observation: Observation | None = None
     """The frame's, which the estimate was judged by."""
 
+    @property
+    def agreement(self) -> float:
+        """The overlap: the measure of a loss."""
+        return self.overlap
+
 
 @dataclass(frozen=True, eq=False)
 class MonocularTracker:

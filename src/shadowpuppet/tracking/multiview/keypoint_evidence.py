@@ -17,27 +17,44 @@ from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.keypoints.candidates import candidates, pose_at, seem_wrong, triangulated_landmarks
-from shadowpuppet.tracking.keypoints.choice import people_at, people_in
+from shadowpuppet.tracking.keypoints.choice import people_at, people_in, person_between
 from shadowpuppet.tracking.keypoints.front import CERTAIN, KeypointFront, front_of
 from shadowpuppet.tracking.keypoints.likelihood import exchanges
 from shadowpuppet.tracking.keypoints.sights import NEAR, Sights, sights_of
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refiner
-from shadowpuppet.tracking.multiview.settings import GaussNewtonSettings, MultiviewSettings
+from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
+FEWEST = 4
+"""Least number of landmarks of a person in a picture."""
 NO_POINTS = make_cloud(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
 
 
 class KeypointEvidence:
     """Keypoints of one frame. Everything is computed on first use."""
 
-    def __init__(self, refiner: Refiner, sights: Sights, worth: float, settings: GaussNewtonSettings, last: Array | None = None) -> None:
-        """`worth`: what a nat of their surprise costs, m^2; `last`: the last pose (D,), if the person was tracked."""
-        self.refiner, self.sights, self.worth, self.settings, self.last = refiner, sights, worth, settings, last
+    def __init__(self, refiner: Refiner, sights: Sights, settings: MultiviewSettings, middle: Array, cameras: int,
+                 last: Array | None = None) -> None:
+        """`middle` (3,): about where the person is, world; `cameras`: number of all cameras; `last`: the last pose (D,), if the person was
+        tracked."""
+        self.refiner, self.sights, self.settings, self.middle, self.cameras, self.last = refiner, sights, settings, middle, cameras, last
+        self.worth = settings.keypoints
 
     def without(self, camera: int) -> KeypointEvidence:
         """The same without a camera."""
-        return KeypointEvidence(self.refiner, self.sights.without(camera), self.worth, self.settings, self.last)
+        return KeypointEvidence(self.refiner, self.sights.without(camera), self.settings, self.middle, self.cameras, self.last)
+
+    @property
+    def show_person(self) -> bool:
+        """Whether two cameras, or the only one, show enough landmarks of a person."""
+        sure = self.sights.cameras[self.sights.outlying < 0.5]
+        return int((np.bincount(sure, minlength=1) >= FEWEST).sum()) >= min(2, self.cameras)
+
+    def support(self, pose: Array) -> float:
+        """Share of the keypoints, by their confidence, that lie near the landmarks of a pose (D,), on whichever side; NaN without any."""
+        marks, sure = self.refiner.landmarks, 1 - self.sights.outlying
+        places = self.refiner.body.skeleton.points(pose[None], marks.joints, marks.places)[0]
+        return float((sure * (self.sights.squares_from(places, marks) < NEAR**2)).sum() / sure.sum()) if len(sure) else np.nan
 
     @property
     def rays(self) -> tuple[Sights, float]:
@@ -85,24 +102,28 @@ class KeypointEvidence:
         """Poses (n, D) brought to the rays, without the surface."""
         if not len(poses):
             return poses
-        s = self.settings
+        s = self.settings.gauss_newton
         each = Pass(NO_POINTS, s.coarse + s.fine, s.fine_tau, sights=self.sights, worth=self.worth)
         return self.refiner.descend(poses, each, poses, np.full(poses.shape[1], s.pull), s.damping)[0]
 
 
 def keypoint_evidence(refiner: Refiner, cameras: Sequence[Camera], settings: MultiviewSettings, keypoints: Sequence[Keypoints | None],
-                      masks: Sequence[Mask | None], middle: Array, last: Array | None = None) -> KeypointEvidence | None:
+                      masks: Sequence[Mask | None], middle: Array | None, last: Array | None = None) -> KeypointEvidence | None:
     """What a frame's keypoints, one per camera, say of the person: of those in the masks (H, W), or of those nearest to the `last` pose
-    (D,). `middle` (3,): about where the person is, world. None without keypoints."""
+    (D,). `middle` (3,): about where the person is, world; None if that is not known. None without keypoints."""
     if not settings.keypoints or not any(each is not None and len(each.person) for each in keypoints):
         return None
     marks = refiner.landmarks
-    if last is None:
+    if last is not None:
+        places = refiner.body.skeleton.points(last[None], marks.joints, marks.places)[0]
+        people = people_at(places, cameras, keypoints, marks)
+        middle = np.asarray(places.mean(0) if middle is None else middle)
+    elif middle is not None:
         people = people_in(masks, cameras, keypoints)
     else:
-        people = people_at(refiner.body.skeleton.points(last[None], marks.joints, marks.places)[0], cameras, keypoints, marks)
+        people, middle = person_between(cameras, keypoints, marks)
     sights = sights_of(cameras, keypoints, people, marks, middle)
-    return KeypointEvidence(refiner, sights, settings.keypoints * settings.sigma_cost**2, settings.gauss_newton, last)
+    return KeypointEvidence(refiner, sights, settings, middle, len(cameras), last)
 
 
 def opening_heading(looks: Sequence[KeypointEvidence], now: KeypointEvidence) -> float | None:

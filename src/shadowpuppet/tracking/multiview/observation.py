@@ -78,7 +78,7 @@ class MultiviewObservation:
 
     @cached_property
     def _origin(self) -> Array:
-        return middle_of(self.surface)
+        return middle_of(self.surface) if self.keypoints is None or len(self.surface.points) else self.keypoints.middle
 
     @property
     def rays(self) -> tuple[Sights, float]:
@@ -89,6 +89,11 @@ class MultiviewObservation:
     def seen(self) -> tuple[int, ...]:
         """Indices of the cameras that see a person."""
         return tuple(n for n, mask in enumerate(self.masks) if mask is not None and may_be_person(mask))
+
+    @property
+    def by_keypoints(self) -> bool:
+        """Whether no camera has a silhouette, so that keypoints alone are evidence."""
+        return all(mask is None for mask in self.masks)
 
     @cached_property
     def halves(self) -> Halves:
@@ -138,7 +143,10 @@ class MultiviewObservation:
         return found
 
     def overlap(self, pose: Array) -> float:
-        """Intersection over union of a drawn pose (D,) and the silhouettes, mean of all pictures; 0 without silhouettes."""
+        """Intersection over union of a drawn pose (D,) and the silhouettes, mean of all pictures; 0 if no person is
+        visible in them, and NaN without silhouettes."""
+        if self.by_keypoints:
+            return np.nan
         overlaps = self.overlaps(pose)[list(self.seen)]
         return float(np.mean(overlaps)) if len(overlaps) else 0.0
 

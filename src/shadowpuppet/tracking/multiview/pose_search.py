@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.whole_body import GLOBAL_DOFS, heading_column
 from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.keypoints.candidates import placed_by_rays
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
 from shadowpuppet.tracking.multiview.posture_prior import usual_arms, usual_postures
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refiner
@@ -42,8 +43,16 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
     """The `number` best poses (number, D) for a frame's surface points, with the costs and weights of `weigh`.
 
     `library`: initial poses (L, D); their position and heading are ignored. `facing`: heading (rad) from which poses begin less than a
-    quarter turn away; None: in all headings. The poses that keypoints show are refined however far they are from the points.
+    quarter turn away; None: in all headings. The poses that keypoints show are refined however far they are from the points. Without
+    surface points poses are placed and chosen by keypoints.
     """
+    keypoints = observation.keypoints
+
+    def rough(poses: Array, tau: float) -> Array:
+        if keypoints is not None and not len(observation.surface.points):
+            return keypoints.cost(poses)
+        return refiner.costs(poses, observation.cloud(COARSE_STAGES[0][0]), tau)
+
     postures = usual_postures(body.skeleton)
     known = np.asarray([] if library is None else library, float)
     if len(known):
@@ -51,17 +60,19 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
             known = known[np.sort(rng.choice(len(known), MAX_LIBRARY_POSES, replace=False))]
         postures = np.concatenate([known, postures])
     poses = place_postures(body, postures, observation.full.origin)
-    poses = np.concatenate([poses, stood(body, poses, _lowest(observation.surface.points))])
-    share, _, tau = COARSE_STAGES[0]
+    if len(observation.surface.points):
+        poses = np.concatenate([poses, stood(body, poses, _lowest(observation.surface.points))])
+    elif keypoints is not None:
+        poses = placed_by_rays(body, poses, refiner.landmarks, keypoints.sights)
     poses = _towards(body, poses, facing)
-    poses = poses[refiner.costs(poses, observation.cloud(share), tau).argsort(kind="stable")[:COARSE_CANDIDATES]]
-    if observation.keypoints is not None:
-        poses = np.concatenate([poses, _towards(body, observation.keypoints.either_way, facing)])
+    poses = poses[rough(poses, COARSE_STAGES[0][2]).argsort(kind="stable")[:COARSE_CANDIDATES]]
+    if keypoints is not None:
+        poses = np.concatenate([poses, _towards(body, keypoints.either_way, facing)])
     poses = best_of((evaluate(_refined(refiner, observation, poses, COARSE_STAGES), weigh),), FINE_CANDIDATES).poses
     found = best_of((evaluate(_refined(refiner, observation, poses, FINE_STAGES), weigh),), number)
     for _, side in product(range(ARM_ROUNDS), ("left", "right")):
         tried = _other_arms(rng, body, found.best, side)
-        tried = tried[refiner.costs(tried, observation.cloud(share), COARSE_STAGES[1][2]).argsort(kind="stable")[:FINE_CANDIDATES]]
+        tried = tried[rough(tried, COARSE_STAGES[1][2]).argsort(kind="stable")[:FINE_CANDIDATES]]
         found = best_of((found, evaluate(_refined(refiner, observation, tried, FINE_STAGES), weigh)), number)
     return found
 

@@ -145,9 +145,9 @@ class MultiviewSettings:
     """Weight (m^2) of the share of the silhouettes' pixels that have the colours of this person's hands and bare forearms and that no arm
     covers. The colours are learnt from the film where they differ from the clothes'. 0: not looked for. Default: 0.1 with four cameras or
     fewer; more show arms well enough."""
-    keypoints: NonNegative = 0.25
-    """Weight of a detector's keypoints, where there are any: what a nat of their surprise costs, over sigma_cost squared. Errors of a
-    detector's landmarks go together, so that each counts as a quarter of an observation. 0: they are not used."""
+    keypoints: NonNegative = 1e-4
+    """Weight (m^2) of how surprising a detector's keypoints are, where there are any, in units of a log density as of `arms` and `limbs`.
+    0: they are not used."""
     cycles: Annotated[int, Field(ge=1, le=100)] | None = None
     """Estimation cycles per frame (annealing). None: one for each 1/30 s that a frame lasts, at most four; one when live."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6

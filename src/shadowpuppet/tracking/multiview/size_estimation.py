@@ -51,7 +51,7 @@ INDEPENDENT_POINTS = {"anatomical": 10.0, "cylinders": 0.2}
 SIZE_PULL = 1e-5
 """Weight of the pull of the poses to the tracked ones."""
 OVERLAP_LOSS = 0.06
-"""A frame whose overlap is lower than the best by more than this is left out: its pose is wrong."""
+"""A frame whose agreement is lower than the best by more than this is left out: its pose is wrong."""
 CLOTHES = 1.1
 """Widths of dressed people over those of average bodies: silhouettes show clothes and hair. Without it, a body whose legs are bent fits
 best if it is drawn 5 to 10 % too large (in made films)."""
@@ -97,7 +97,7 @@ class SizeEstimate(Generic[Measured]):
     residual: float
     """Root mean square distance of the surface points to the tangent planes, metres."""
     overlap: float
-    """Mean intersection over union of body and silhouettes."""
+    """Mean intersection over union of body and silhouettes; NaN without silhouettes."""
     frames: int
     """Frames in which the person was found."""
     pose: Array
@@ -232,7 +232,7 @@ def heading_of(body: Body, pose: Array) -> float:
 
 def _followed(rng: np.random.Generator, tracker: MultiviewTracker, first: First, begin: int, facing: float | None) -> list[Found]:
     """The frames in which the person is found: searched for in the frame `begin`, as facing a heading (rad) or any way, followed from there
-    back to the first one and then through all, and searched for again if the overlap falls."""
+    back to the first one and then through all, and searched for again if the agreement falls."""
     state, found, best, frames = None, list[Found](), 0.0, first_frames(first)
 
     def begun(frame: FirstFrame) -> MultiviewState:
@@ -246,11 +246,11 @@ def _followed(rng: np.random.Generator, tracker: MultiviewTracker, first: First,
     state = None if state is None else state._replace(velocity=np.zeros_like(state.velocity), unexplained=())
     for n, frame in enumerate(frames):
         state = stepped(state, frame)
-        if state.overlap < best - OVERLAP_LOSS and state.status != "absent":
+        if state.agreement < best - OVERLAP_LOSS and state.status != "absent":
             facing = None if facing is None else heading_of(tracker.body, state.pose)
             again = begun(frame)._replace(unexplained=state.unexplained)
             state = min(state, again, key=lambda each: each.cost)
-        best = max(best, state.overlap)
+        best = max(best, state.agreement)
         if state.status in ("tracked", "uncertain"):
             found.append((n, state))
-    return [(n, state) for n, state in found if state.overlap > best - OVERLAP_LOSS]
+    return [(n, state) for n, state in found if state.agreement > best - OVERLAP_LOSS]

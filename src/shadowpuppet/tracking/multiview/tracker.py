@@ -41,6 +41,8 @@ from shadowpuppet.tracking.unexplained import Unexplained, look_beside
 
 ARM_COLOURS = 0.1
 """`MultiviewSettings.arm_colours` of few cameras."""
+CONTRADICTION = 0.4
+"""Difference of overlap and support from which on silhouettes and keypoints are of different things."""
 WELL = 0.75
 """Least overlap of body and silhouettes at which colours are learnt."""
 MIN_POINTS, MIN_EXTENT = 50, 0.5
@@ -66,7 +68,7 @@ class MultiviewState(NamedTuple):
     cost: float
     """Cost of the estimate, m^2."""
     overlap: float
-    """Intersection over union of the drawn estimate and the silhouettes, mean of all cameras."""
+    """Intersection over union of the drawn estimate and the silhouettes, mean of all cameras; NaN without silhouettes."""
     status: str
     """`tracked`, `uncertain`, `lost` or `absent`."""
     unexplained: tuple[Unexplained | None, ...] = ()
@@ -79,6 +81,13 @@ class MultiviewState(NamedTuple):
     """The motion prior's region drawn for each particle (N,); None where it is the one nearest to the pose."""
     against: float = 0.0
     """Log odds of keypoints in the last frames against the way that the body faces."""
+    support: float = np.nan
+    """Share of the keypoints that lie near the estimate; NaN without keypoints."""
+
+    @property
+    def agreement(self) -> float:
+        """The overlap, or the support where that is greater: furniture in silhouettes and a poor detector are no loss."""
+        return float(np.fmax(self.overlap, self.support))
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +180,8 @@ class MultiviewTracker:
               keypoints: Sequence[Keypoints | None] = (), last: Array | None = None) -> KeypointEvidence | None:
         """What the keypoints of one frame say of the person, who was in the `last` pose (D,) if it is known; None without any. Arguments as
         in `step`."""
-        return keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, masks, middle_of(points), last)
+        middle = middle_of(points) if len(points.points) else None
+        return keypoint_evidence(self.refiner, self.cameras, self.settings, keypoints, masks, middle, last)
 
     def _faced(self, rng: np.random.Generator, state: MultiviewState, found: MultiviewState,
                observation: MultiviewObservation) -> MultiviewState:
@@ -311,12 +321,17 @@ class MultiviewTracker:
 
     def judge(self, pose: Array, velocity: Array, particles: Particles, observation: MultiviewObservation,
               weigh: Weigh) -> MultiviewState:
-        """The state of a pose (D,), with its cost, overlap and status."""
-        overlap = observation.overlap(pose)
-        return MultiviewState(pose, velocity, particles, float(weigh(pose[None])[0][0]), overlap, status_of(overlap))
+        """The state of a pose (D,), with its cost, overlap, support and status."""
+        cost, overlap = float(weigh(pose[None])[0][0]), observation.overlap(pose)
+        support = np.nan if observation.keypoints is None else observation.keypoints.support(pose)
+        found = MultiviewState(pose, velocity, particles, cost, overlap, "", support=support)
+        status = status_of(found.agreement)
+        return found._replace(status="uncertain" if status == "tracked" and abs(overlap - support) > CONTRADICTION else status)
 
     def is_present(self, observation: MultiviewObservation) -> bool:
-        """Whether the surface points are enough, and extended enough, for a person."""
+        """Whether the surface points are enough, and extended enough, for a person; or, without silhouettes, the keypoints."""
+        if observation.by_keypoints:
+            return observation.keypoints is not None and observation.keypoints.show_person
         points = observation.surface.points
         return len(points) >= MIN_POINTS and float(np.linalg.norm(np.ptp(points, axis=0))) > MIN_EXTENT
 

@@ -108,7 +108,8 @@ class Ground:
         if (n, k) not in self.projected:
             sides = np.array([ASIDE[0], 0.0, ASIDE[-1]])
             points = figure_points(self.cameras[n], self.places, np.full(3, k * SPACING), sides)
-            self.projected[n, k] = self.cameras[n].project(points).astype(np.float32)
+            with np.errstate(over="ignore"):  # of a point beside the lens, infinitely far outside the picture
+                self.projected[n, k] = self.cameras[n].project(points).astype(np.float32)
         return self.projected[n, k]
 
 

@@ -37,9 +37,9 @@ def animation_figure(name: str, animation: Animation, mesh: Mesh | None = None, 
                      statuses: LimbStatuses | None = None, **more) -> SceneFigure:
     """Figure of a moving skeleton with a mesh, by default a stick along every bone. `more`: fields of `SceneFigure`."""
     places, turns = animation.world()
-    more = {"joints": places, "joint_names": animation.names} | more
+    own = {"joints": places, "joint_names": animation.names, "bones": bones_of(more.get("joint_names", animation.names))}
     return SceneFigure(name, animation.times, mesh or bone_mesh(animation), animation.rest, places, turns, kind,
-                  **_of_statuses(animation.names, statuses), **more)
+                  **_of_statuses(animation.names, statuses), **(own | more))
 
 
 def _of_statuses(names: Sequence[str], statuses: LimbStatuses | None) -> dict[str, Any]:
@@ -61,17 +61,22 @@ def pose_figure(name: str, body: Body, times: Array, poses: Array, root: Array, 
     return animation_figure(name, BodyTree(body).animation(times, poses, root), body_mesh(body), kind)
 
 
+def bones_of(names: Sequence[str]) -> tuple[tuple[int, int], ...]:
+    """Indices of the ends of the bones between joints of these names."""
+    return tuple((names.index(a), names.index(b)) for a, b in BONES if a in names and b in names)
+
+
 def joint_figure(name: str, table: JointTable, kind: str = "estimate", **more) -> SceneFigure:
     """Figure of joints without a skeleton: a stick for every bone between them, a dot for each other joint. `more`: as of
     `animation_figure`."""
     table = _with_midpoints(table)
     names = list(table.names)
-    pairs = [(names.index(a), names.index(b)) for a, b in BONES if a in names and b in names]
+    pairs = bones_of(names)
     used = {n for pair in pairs for n in pair}
     places = table.positions
     ends = [(places[:, a], places[:, b], names[b]) for a, b in pairs]
     ends += [(places[:, n], places[:, n] + np.array([0, 0, DOT]), names[n]) for n in range(len(names)) if n not in used]
-    more = {"joints": places, "joint_names": tuple(names), "bones": tuple(pairs)} | more
+    more = {"joints": places, "joint_names": tuple(names), "bones": pairs} | more
     return _of_sticks(name, table.times, ends, kind, **more)
 
 

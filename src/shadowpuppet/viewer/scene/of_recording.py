@@ -37,7 +37,8 @@ def cameras_of(recording: Recording, options: Options, ready: bool | None = None
     ready = all(view.masks is not None for view in views) if ready is None else ready
     options = replace(options, masks=ready)
     footage = [camera_footage(recording, view, options) for view in views]
-    return tuple(SceneCamera(each.camera, FilmImages(each, options)) for each in footage), footage, ready
+    shown = [(each.camera, FilmImages(each, options), None if each.keypoints is None else each.keypoints_at) for each in footage]
+    return tuple(SceneCamera(*each) for each in shown), footage, ready
 
 
 def frame_times(footage: Sequence[Footage]) -> Array:

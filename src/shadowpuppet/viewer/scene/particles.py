@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from shadowpuppet.body.shapes import Body
-from shadowpuppet.body.skeleton import BONES
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, align
@@ -20,6 +19,7 @@ from shadowpuppet.tracking.multiview.surface.visual_hull import VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import diffuse, evaluate, gathered
 from shadowpuppet.tracking.resampling import normalise
+from shadowpuppet.viewer.scene.figures import bones_of
 from shadowpuppet.viewer.scene.scene import ParticleCloud, SceneCamera
 
 SEED = 0
@@ -38,7 +38,7 @@ class ParticleRerun:
         self.body, self.motion, self.options = body, motion, options
         self.cameras = [each for each in cameras if each.images is not None]
         self.names = [name for name in motion.joint_names if name in body.landmark_names]
-        self.bones = [(self.names.index(a), self.names.index(b)) for a, b in BONES if a in self.names and b in self.names]
+        self.bones = bones_of(self.names)
         self.root = self._root()
 
     def __call__(self, time: float) -> ParticleCloud | None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS
 from shadowpuppet.motion.mesh import Mesh
@@ -81,7 +82,7 @@ class SceneFigure:
     joint_sd: Array | None = None
     """Their standard deviations along the world's axes, of shape (T, K, 3), metres."""
     bones: tuple[tuple[int, int], ...] = ()
-    """Pairs of these joints with a line between them, where a figure is drawn as lines."""
+    """Pairs of these joints with a line between them, where a figure is drawn as lines, or a camera is looked through."""
     limbs: tuple[str, ...] = ()
     """Limbs, of `LIMBS`, with a status."""
     limb_status: NDArray[np.str_] | None = None
@@ -143,6 +144,8 @@ class SceneCamera:
     camera: Camera
     """For pictures of the size of `images`."""
     images: CameraImages | None = None
+    keypoints: Callable[[float], Keypoints] | None = None
+    """What a detector found at a time of the recording (s), in pixels of these pictures; None: there was none."""
 
 
 @dataclass(frozen=True, eq=False)

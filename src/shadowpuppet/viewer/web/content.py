@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shadowpuppet.camera.drawing import MIDDLE_COLOUR, SIDE_COLOURS
 from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.io.intervals import HALF_WIDTH
+from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.motion.motion import STATUSES
 from shadowpuppet.viewer.scene.scene import Chart, SceneCamera, SceneFigure, Stage
 from shadowpuppet.viewer.scene.strip import Strip, doubtful_moments, strips_of
@@ -25,21 +27,22 @@ SCRIPTS = ("stage.js", "charts.js", "page.js")
 BY_CAMERA = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442")
 """Colours of cameras (Okabe and Ito 2008) and of the hull points on their contours."""
 NOTHING = "'none'"
+Images = Mapping[str, Sequence[Sequence[str]]]
 
 
-def page_text(scene: Stage, cameras: Sequence[Undistorter], images: Sequence[Sequence[str]] | None, pictures: bool,
+def page_text(scene: Stage, cameras: Sequence[Undistorter], images: Images | None,
               frames: NDArray[np.int64] | None = None) -> str:
     """The page of a scene.
 
     Args:
         scene: what is shown.
         cameras: for each camera, what its images are undistorted by.
-        images: data URLs of each camera's images by frame, empty where there is none; None if the page asks its server for them.
-        pictures: whether images are pictures, else silhouettes, at first.
+        images: `pictures` and `silhouettes`, or these alone: data URLs of each camera's images by frame, empty where there is none; None if
+            the page asks its server for them.
         frames: indices of the frames that the page has; None: all.
     """
     every = np.arange(len(scene.times)) if frames is None else frames
-    data = json.dumps(content(scene, cameras, images, pictures, every), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    data = json.dumps(content(scene, cameras, images, every), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     script, style = script_text(SCRIPTS), _file("page.css")
     server = "'self'" if images is None else ""
     policy = (f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; img-src data: {server}; "
@@ -61,7 +64,7 @@ def _hash(text: str) -> str:
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 
 
-def content(scene: Stage, cameras: Sequence[Undistorter], images: Sequence[Sequence[str]] | None, pictures: bool,
+def content(scene: Stage, cameras: Sequence[Undistorter], images: Images | None,
             frames: NDArray[np.int64]) -> dict[str, Any]:
     """A scene for the page's scripts, as JSON; arguments as of `page_text`."""
     times = scene.times[frames]
@@ -70,8 +73,8 @@ def content(scene: Stage, cameras: Sequence[Undistorter], images: Sequence[Seque
         "title": scene.title, "times": packed(times, "f8"), "frames": packed(frames, "u4"), "statuses": STATUSES,
         "box": [low.tolist(), high.tolist()], "floor": scene.floor, "direction": (scene.viewpoint - scene.middle).tolist(),
         "figures": [_figure(figure, times) for figure in scene.figures],
-        "cameras": [_camera(each, lens, n) for n, (each, lens) in enumerate(zip(scene.cameras, cameras))],
-        "images": images, "pictures": pictures, "served": images is None,
+        "cameras": [_camera(each, lens, n, times) for n, (each, lens) in enumerate(zip(scene.cameras, cameras))],
+        "images": images, "served": images is None, "sides": [colour[::-1] for colour in (MIDDLE_COLOUR, *SIDE_COLOURS.values())],
         "hull": images is None and scene.hull is not None, "particles": images is None and scene.cloud is not None,
         "charts": [_chart(chart, times) for chart in scene.charts],
         "strips": [_strip(strip, frames) for strip in strips_of(scene)],
@@ -87,6 +90,8 @@ def _figure(figure: SceneFigure, times: Array) -> dict[str, Any]:
     found = motion_content(figure, times) | {
         "name": figure.name, "kind": figure.kind, "shift": figure.shift, "joints": figure.places.shape[1],
         "jointNames": [name.replace("_", " ") for name in figure.joint_names], "bones": figure.bones,
+        "jointLimbs": [LIMBS.index(limb_of(name)) for name in figure.joint_names],
+        "jointSides": [_side(name) for name in figure.joint_names],
         "limbs": 0 if figure.doubtful is None else figure.doubtful.frames.shape[1],
     }  # fmt: skip
     if figure.kind == "truth" and figure.joints is not None and figure.bones:
@@ -112,10 +117,32 @@ def motion_content(figure: SceneFigure, times: Array) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _camera(each: SceneCamera, lens: Undistorter, n: int) -> dict[str, Any]:
+def _camera(each: SceneCamera, lens: Undistorter, n: int, times: Array) -> dict[str, Any]:
     T = inverse(each.camera.T_camera_world)
     return {"name": each.camera.name, "pose": T.tolist(), "tan": [lens.aspect * np.tan(lens.fov / 2), np.tan(lens.fov / 2)],
-            "colour": BY_CAMERA[n % len(BY_CAMERA)], "images": each.images is not None, "width": lens.size[0], "height": lens.size[1]}
+            "colour": BY_CAMERA[n % len(BY_CAMERA)], "images": each.images is not None, "width": lens.size[0], "height": lens.size[1],
+            **_keypoints(each, lens, times)}
+
+
+def _keypoints(each: SceneCamera, lens: Undistorter, times: Array) -> dict[str, Any]:
+    """A detector's keypoints at times (s): for each place the index of its colour in `sides`; and, of shape (T, places, 3), x and y in the
+    undistorted image, from -1 to 1, and the confidence, 0 for none, all times 10,000. Nothing without keypoints."""
+    found = [] if each.keypoints is None else [each.keypoints(float(time)) for time in times]
+    if not found:
+        return {}
+    sides = [_side(name) for name in found[0].names]
+    people, half = max(len(one.xy) for one in found), np.array([lens.aspect, 1.0]) * np.tan(lens.fov / 2)
+    out = np.zeros((len(found), people * len(sides), 3))
+    for one, place in zip(found, out):
+        known = np.column_stack([each.camera.rays(one.xy)[..., :2].reshape(-1, 2) / half, one.confidence.ravel()])
+        place[: len(known)] = np.where((np.abs(known) <= 1).all(1, keepdims=True), known, 0)
+    return {"sides": sides * people, "keypoints": packed(10_000 * out, "i2")}
+
+
+def _side(name: str) -> int:
+    """Index of a landmark's colour in `sides`."""
+    side = name.partition("_")[0]
+    return list(SIDE_COLOURS).index(side) + 1 if side in SIDE_COLOURS else 0
 
 
 def _chart(chart: Chart, times: Array) -> dict[str, Any]:

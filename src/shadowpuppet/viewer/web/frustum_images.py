@@ -11,25 +11,16 @@ from shadowpuppet.viewer.scene.scene import CameraImages
 
 WIDEST = 1.9
 """Tangent of half the greatest field of view; fisheye pictures are cut there."""
-OUTLINE = (60, 200, 255)
-"""Colour of a silhouette's outline over a picture, blue green red."""
 
 
 def camera_image(images: CameraImages, undistort: Undistorter, time: float, pictures: bool) -> NDArray[np.uint8] | None:
-    """A camera's undistorted image at a time (s): the picture with the silhouette's outline, (H, W, 3), blue green red; or the silhouette
-    alone, (H, W), white on black. None if there is none."""
-    import cv2
-
+    """A camera's undistorted image at a time (s): the picture, (H, W, 3), blue green red; or the silhouette, (H, W), white on black. None
+    if there is none."""
+    if pictures:
+        image = images.picture(time)
+        return None if image is None else undistort(image)
     mask = images.mask(time)
-    silhouette = None if mask is None else np.where(undistort(mask.astype(np.uint8) * 255) > 127, 255, 0).astype(np.uint8)
-    image = images.picture(time) if pictures else None
-    if not pictures or image is None:
-        return None if pictures else silhouette
-    out = np.ascontiguousarray(undistort(image))
-    if silhouette is not None:
-        lines = cv2.findContours(silhouette, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
-        cv2.drawContours(out, lines, -1, OUTLINE, 1, cv2.LINE_AA)
-    return out
+    return None if mask is None else np.where(undistort(mask.astype(np.uint8) * 255) > 127, 255, 0).astype(np.uint8)
 
 
 class Undistorter:

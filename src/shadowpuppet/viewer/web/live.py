@@ -76,14 +76,14 @@ class LiveSpace:
         rest = self.body.skeleton.clamp(np.zeros((1, len(self.body.skeleton.dofs))))[0]
         figure = self.figure(rest if view.pose is None else view.pose)
         scene = Stage(title="live", times=NOW, figures=(figure,), cameras=self._cameras)
-        return content(scene, self._lenses, None, True, np.arange(1)) | {"number": self.number, "film": len(self._cameras) == 1}
+        return content(scene, self._lenses, None, np.arange(1)) | {"number": self.number, "film": len(self._cameras) == 1}
 
     def puppet(self, view: SessionState) -> dict[str, Any] | None:
         """The body's motion for the stage; None without a trustworthy pose."""
         return None if view.pose is None else motion_content(self.figure(view.pose, view.doubtful), NOW)
 
     def figure(self, pose: Array, doubtful: frozenset[str] = frozenset()) -> SceneFigure:
-        """The body in a pose (D,), the limbs of `doubtful` landmarks pale."""
+        """The body in a pose (D,), the limbs of `doubtful` landmarks hatched."""
         names = self.body.landmark_names
         limbs, pale = limbs_of(names), {limb_of(name) for name in names if name in doubtful}
         statuses = LimbStatuses(limbs, np.array([["uncertain" if limb in pale else "tracked" for limb in limbs]]))

@@ -6,10 +6,10 @@ const KINDS = {estimate: "puppet", truth: "truth", other: "second run", mean: "m
 class Page {
   constructor(data) {
     this.data = data; this.times = unpack(data.times); this.own = unpack(data.frames);
-    this.frame = 0; this.playing = false; this.speed = 1; this.pictures = data.pictures;
-    this.images = data.cameras.map(() => ({busy: false, kept: new Map(), key: ""}));
+    this.frame = 0; this.playing = false; this.speed = 1;
+    this.images = data.cameras.map(() => Object.fromEntries(LAYERS.map(layer => [layer, {busy: false, key: "", last: null}])));
     this.asked = {};
-    const acts = {look: n => this.look(n), looked: n => this.looked(n), chose: found => this.choose(found), pictures: () => this.pictures};
+    const acts = {look: n => this.look(n), looked: n => this.looked(n), chose: found => this.choose(found)};
     this.stage = new Stage(data, id("space"), id("labels"), acts);
     this.buildViews(); this.buildTimeline(); this.buildShow(); this.buildCurves(); this.buildAbout();
     this.inset(data.cameras.findIndex(each => each.images));
@@ -142,32 +142,45 @@ class Page {
     if (!on) return;
     const camera = this.data.cameras[this.film];
     id("inset").querySelector("figcaption").textContent = camera.name;
-    id("film").alt = `${this.pictures ? "Film" : "Silhouette"} of ${camera.name}`;
-    id("film").style.aspectRatio = `${camera.width} / ${camera.height}`;
-    const image = this.images[this.film].last;
-    if (image) id("film").src = image.src;
+    const [film, person] = LAYERS.map(layer => this.stage.shown[layer] ? this.images[this.film][layer].last : null);
+    for (const [name, image, what] of [["film", film, "Film"], ["person", person, "Silhouette"]]) {
+      const shown = id(name);
+      shown.style.visibility = image ? "visible" : "hidden";
+      shown.alt = image ? `${what} of ${camera.name}` : "";
+      if (image && shown.src != image.src) shown.src = image.src;
+    }
+    id("film").style.aspectRatio = id("marks").style.aspectRatio = `${camera.width} / ${camera.height}`;
+    id("person").className = film ? "over" : "";
+    const arm = 0.05, slim = arm * camera.height / camera.width;
+    id("marks").innerHTML = this.stage.crosses(this.stage.cameras[this.film], this.frame).map(([[x, y], colour, sure]) =>
+      `<path stroke="rgb(${colour})" stroke-opacity="${sure}" d="M${x - slim} ${y}h${2 * slim}M${x} ${y - arm}v${2 * arm}"/>`).join("");
   }
   // The newest image of each camera: at most one is asked for at a time, so that frames are skipped where films are read slowly.
-  fetchImages() { this.data.cameras.forEach((camera, n) => camera.images && this.fetchImage(n)); }
-  fetchImage(n) {
-    const state = this.images[n], wanted = () => `${this.frame} ${this.pictures}`, key = wanted();
+  fetchImages() {
+    for (const layer of this.layers) if (this.stage.shown[layer]) this.data.cameras.forEach((camera, n) => camera.images && this.fetchImage(n, layer));
+    this.updateInset();
+  }
+  fetchImage(n, layer) {
+    const state = this.images[n][layer], key = String(this.frame);
     if (state.busy || state.key == key) return;
-    const url = this.data.served ? `image/${n}/${this.own[this.frame]}/${this.pictures ? "pictures" : "silhouettes"}` : this.data.images[n][this.frame];
-    if (!url) { state.key = key; state.last = null; this.stage.setImage(n, null); return; }
+    const url = this.data.served ? `image/${n}/${this.own[this.frame]}/${layer}` : this.data.images[layer][n][this.frame];
+    if (!url) { state.key = key; state.last = null; this.stage.setImage(n, layer, null); return; }
     const image = new Image();
     state.busy = true;
     const done = found => {
       state.busy = false; state.key = key; state.last = found;
-      this.stage.setImage(n, found);
-      if (n == this.film && found) id("film").src = found.src;
-      if (this.waiting && !this.images.some(each => each.busy)) this.hint("");
-      if (wanted() != key) this.fetchImage(n);
+      this.stage.setImage(n, layer, found);
+      if (n == this.film) this.updateInset();
+      if (this.waiting && !this.busy()) this.hint("");
+      if (String(this.frame) != key && this.stage.shown[layer]) this.fetchImage(n, layer);
     };
     image.onload = () => done(image);
     image.onerror = () => done(null);
     image.src = url;
-    if (this.data.served && !this.started) { this.started = true; setTimeout(() => this.images.some(each => each.busy) && this.hint("reading the films"), 700); }
+    if (this.data.served && !this.started) { this.started = true; setTimeout(() => this.busy() && this.hint("reading the films"), 700); }
   }
+  busy() { return this.images.some(each => LAYERS.some(layer => each[layer].busy)); }
+  get layers() { return LAYERS.filter(layer => this.data.served || layer in this.data.images); }
   hint(text) { this.waiting = Boolean(text); id("hint").textContent = text; id("hint").hidden = !text; }
   async ask(what) {
     if (!this.data[what] || !this.stage.shown[what] || this.asked[what]) return;
@@ -196,8 +209,12 @@ class Page {
     if (data.cameras.length) add("cameras", true, on => { stage.shown.cameras = on; });
     if (data.cameras.some(each => each.images)) {
       add("images at the cameras", true, on => { stage.shown.images = on; });
-      this.showInset = add(`${data.pictures ? "film" : "silhouette"} in the corner`, true, () => this.updateInset());
-      if (data.served) add("silhouettes only", !data.pictures, on => { this.pictures = !on; this.fetchImages(); this.updateInset(); });
+      this.showInset = add("a camera's image in the corner", true, () => this.updateInset());
+      for (const layer of this.layers) add(layer, true, on => { stage.shown[layer] = on; this.fetchImages(); });
+    }
+    if (data.cameras.some(each => each.keypoints)) {
+      add("keypoints", true, on => { stage.shown.keypoints = on; this.updateInset(); });
+      add("rays of the keypoints", false, on => { stage.shown.rays = on; });
     }
     if (stage.figures.some(each => each.sd)) add("90 % intervals of the joints", true, on => { stage.shown.intervals = on; });
     if (data.hull) add("hull points", stage.shown.hull = !data.figures.some(each => each.kind == "estimate"), on => { stage.shown.hull = on; this.ask("hull"); });

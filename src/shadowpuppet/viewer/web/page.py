@@ -37,21 +37,23 @@ def check_page(path: Path) -> None:
 
 
 def write_page(path: str | Path, scene: Stage, pictures: bool = False, listener: Listener | None = None) -> Path:
-    """Write a scene as one file, with pictures of people only if `pictures`, else silhouettes. Raises `ShadowPuppetError` if it cannot be
-    written."""
+    """Write a scene as one file, with silhouettes, and with pictures of people only if `pictures`. Raises `ShadowPuppetError` if it cannot
+    be written."""
     path, listener = Path(path), listener or Listener()
     check_page(path)
     frames, lenses = kept_frames(scene.times), [Undistorter(each.camera, WIDTH) for each in scene.cameras]
     listener.begin("writing", len(frames))
-    images: list[list[str]] = [[] for _ in lenses]
+    images: dict[str, list[list[str]]] = {layer: [[] for _ in lenses] for layer in ("pictures", "silhouettes")[not pictures :]}
     with ThreadPoolExecutor(usable_cores(), "images") as pool:  # a camera's images are for one thread at a time
         for n, frame in enumerate(frames.tolist()):
             time = float(scene.times[frame])
-            made = pool.map(lambda each, lens, time=time: _url(each.images, lens, time, pictures), scene.cameras, lenses)
-            for kept, url in zip(images, made):
-                kept.append(url)
+            made = pool.map(lambda each, lens, time=time: [_url(each.images, lens, time, layer == "pictures") for layer in images],
+                            scene.cameras, lenses)
+            for camera, urls in enumerate(made):
+                for kept, url in zip(images.values(), urls):
+                    kept[camera].append(url)
             listener.advance(n + 1)
-    write_whole(path, page_text(scene, lenses, images, pictures, frames))
+    write_whole(path, page_text(scene, lenses, images, frames))
     return path
 
 

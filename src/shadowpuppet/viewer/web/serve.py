@@ -39,7 +39,7 @@ class ScenePage:
     @cached_property
     def text(self) -> bytes:
         """The page."""
-        return page_text(self.scene, self.lenses, None, pictures=True).encode()
+        return page_text(self.scene, self.lenses, None).encode()
 
     def part(self, path: str) -> tuple[bytes, str] | None:
         """Content of a path of the server, and its type; None for an unknown path, empty if there is nothing to show:

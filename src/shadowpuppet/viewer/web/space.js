@@ -27,7 +27,7 @@ async function build() {
     find("scene").replaceChildren(canvas, labels);
     if (find("views").hidden) toggle(true);
     find("views").hidden = false;
-    const acts = {look: n => stage.look(n), looked: () => {}, chose: () => {}, pictures: () => true};
+    const acts = {look: n => stage.look(n), looked: () => {}, chose: () => {}};
     stage = new Stage(scene, canvas, labels, acts);
     new ResizeObserver(() => { stage.stale = true; }).observe(canvas);
     stage.frameAll();
@@ -40,7 +40,7 @@ async function build() {
 function fetchImage() {
   const image = new Image();
   asked = Infinity;
-  image.onload = () => { asked = performance.now(); stage.setImage(0, image); };
+  image.onload = () => { asked = performance.now(); stage.setImage(0, "pictures", image); };
   image.onerror = () => { asked = performance.now(); };
   image.src = `space.jpg?${performance.now()}`;
 }

@@ -40,14 +40,14 @@ void main() {
 const BODY_FRAGMENT = `#version 300 es
 precision highp float;
 in vec3 outward; in vec3 paint; in float faint;
-uniform vec3 toward; uniform vec3 fade;
+uniform vec3 toward; uniform vec3 fade; uniform float scale; uniform float opacity;
 out vec4 seen;
 void main() {
-  if (faint > 0.5 && mod(floor(gl_FragCoord.x) + floor(gl_FragCoord.y), 2.0) < 0.5) discard;
+  if (faint > 0.5 && mod(gl_FragCoord.x + gl_FragCoord.y, 8.0 * scale) < 4.0 * scale) discard;
   vec3 n = normalize(outward);
   if (dot(n, toward) < 0.0) n = -n;
   float light = 0.50 + 0.16 * n.z + 0.38 * max(dot(n, normalize(toward + vec3(0.25, 0.15, 0.55))), 0.0);
-  seen = vec4(mix(paint * light, fade, faint * 0.45), 1);
+  seen = vec4(mix(paint * light, fade, faint * 0.2), opacity);
 }`;
 const LINE_VERTEX = `#version 300 es
 in vec2 corner; in vec3 start; in vec3 end; in vec4 colour; in float width;
@@ -74,16 +74,19 @@ void main() { gl_Position = view * vec4(place, 1); gl_PointSize = clamp(wide / g
 const IMAGE_VERTEX = `#version 300 es
 in vec3 place; in vec2 at; uniform mat4 view; out vec2 where; void main() { where = at; gl_Position = view * vec4(place, 1); }`;
 const IMAGE_FRAGMENT = `#version 300 es
-precision highp float; in vec2 where; uniform sampler2D image; uniform float mask; uniform vec3 person; uniform float opacity; out vec4 seen;
+precision highp float; in vec2 where; uniform sampler2D pictures; uniform sampler2D silhouettes; uniform vec2 shown;
+uniform vec3 person; uniform float opacity; out vec4 seen;
 void main() {
-  vec4 texel = texture(image, where);
-  seen = mask > 0.5 ? vec4(person, mix(0.10, 0.85, texel.r) * opacity) : vec4(texel.rgb, opacity);
+  float inside = texture(silhouettes, where).r;
+  vec3 dimmed = texture(pictures, where).rgb * (shown.y > 0.5 ? mix(0.65, 1.0, inside) : 1.0);
+  seen = shown.x > 0.5 ? vec4(dimmed, opacity) : vec4(person, mix(0.10, 0.85, inside) * opacity);
 }`;
+const LAYERS = ["pictures", "silhouettes"];
 
 class Stage {
   constructor(data, canvas, labels, acts) {
     this.data = data; this.canvas = canvas; this.labels = labels; this.acts = acts;
-    this.gl = canvas.getContext("webgl2", {antialias: true});
+    this.gl = canvas.getContext("webgl2", {antialias: true, alpha: false});
     if (!this.gl) throw new Error("this browser shows no WebGL 2");
     this.programs = {
       body: this.program(BODY_VERTEX, BODY_FRAGMENT), line: this.program(LINE_VERTEX, LINE_FRAGMENT),
@@ -91,7 +94,7 @@ class Stage {
     };
     this.figures = data.figures.map(each => this.figure(each));
     this.cameras = data.cameras.map(each => this.camera(each));
-    this.shown = {cameras: true, images: true, intervals: true, hull: false, particles: false, names: true};
+    this.shown = {cameras: true, images: true, pictures: true, silhouettes: true, keypoints: true, rays: false, intervals: true, hull: false, particles: false};
     this.kinds = {};
     this.chosen = null;      // {figure, joint}
     this.through = null;     // index of a camera
@@ -167,18 +170,20 @@ class Stage {
   camera(each) {
     const R = each.pose, centre = [R[0][3], R[1][3], R[2][3]];
     const axis = n => [R[0][n], R[1][n], R[2][n]];
-    return {...each, centre, right: axis(0), down: axis(1), ahead: axis(2), image: this.texture(this.gl.LINEAR), ready: false};
+    const layers = Object.fromEntries(LAYERS.map(layer => [layer, {texture: this.texture(this.gl.LINEAR), ready: false}]));
+    return {...each, centre, right: axis(0), down: axis(1), ahead: axis(2), layers, keypoints: each.keypoints && unpack(each.keypoints)};
   }
-  cornersOf(camera, distance) {
+  // A place of a camera's picture, from -1 to 1 in both directions, at a distance before it.
+  ahead(camera, distance, [x, y]) {
     const [wide, high] = camera.tan, at = V.add(camera.centre, camera.ahead, distance);
-    return [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([x, y]) =>
-      V.add(V.add(at, camera.right, x * wide * distance), camera.down, y * high * distance));
+    return V.add(V.add(at, camera.right, x * wide * distance), camera.down, y * high * distance);
   }
-  setImage(n, image) {
-    const gl = this.gl, camera = this.cameras[n];
-    camera.ready = image !== null;
+  cornersOf(camera, distance) { return [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(at => this.ahead(camera, distance, at)); }
+  setImage(n, layer, image) {
+    const gl = this.gl, own = this.cameras[n].layers[layer];
+    own.ready = image !== null;
     if (image) {
-      gl.bindTexture(gl.TEXTURE_2D, camera.image);
+      gl.bindTexture(gl.TEXTURE_2D, own.texture);
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, image);
     }
     this.stale = true;
@@ -298,10 +303,14 @@ class Stage {
     if (this.shown.hull && this.extra.hull) this.drawPoints(this.extra.hull, matrix);
     if (this.shown.cameras) {
       this.drawLines(this.cameras.flatMap((camera, n) => n == this.through ? [] : this.frustum(camera)), matrix);
-      if (this.shown.images && this.through === null) this.cameras.forEach((camera, n) => this.drawImage(n, matrix, 0.9));
+      if (this.shown.images && this.through === null) {
+        this.cameras.forEach((camera, n) => this.drawImage(n, matrix, 0.9));
+        this.drawLines(this.cameras.flatMap(camera => this.crossLines(camera, frame)), matrix);
+      }
     }
     gl.disable(gl.DEPTH_TEST);
-    this.drawLines([...this.particleLines(), ...this.figures.flatMap(each => this.linesOf(each, frame))], matrix);
+    const crosses = this.through === null ? [] : this.crossLines(this.cameras[this.through], frame);
+    this.drawLines([...this.rays(frame), ...this.particleLines(), ...this.figures.flatMap(each => this.linesOf(each, frame)), ...crosses], matrix);
     this.place(matrix);
   }
   // Index of a figure's own frame that is shown at a frame of the timeline; -1 for none.
@@ -327,6 +336,8 @@ class Stage {
     gl.uniform1fv(this.uniform(program, "pale"), pale);
     gl.uniform3fv(this.uniform(program, "toward"), this.axes()[2]);
     gl.uniform3fv(this.uniform(program, "fade"), this.paint("--paper"));
+    gl.uniform1f(this.uniform(program, "scale"), this.scale);
+    gl.uniform1f(this.uniform(program, "opacity"), this.through === null ? 1 : 0.5);
     gl.bindVertexArray(figure.array);
     gl.drawElements(gl.TRIANGLES, figure.corners, gl.UNSIGNED_INT, 0);
     gl.bindVertexArray(null);
@@ -364,7 +375,8 @@ class Stage {
   }
   drawImage(n, matrix, opacity, behind = false) {
     const camera = this.cameras[n], gl = this.gl, program = this.programs.image;
-    if (!camera.ready) return;
+    const shown = LAYERS.map(layer => this.shown[layer] && camera.layers[layer].ready ? 1 : 0);
+    if (!shown[0] && !shown[1]) return;
     const away = behind ? Math.hypot(...V.sub(camera.centre, this.middle)) + this.size : this.reach;
     const [a, b, c, d] = this.cornersOf(camera, away);
     const values = new Float32Array([...a, 0, 0, ...b, 1, 0, ...d, 0, 1, ...c, 1, 1]);
@@ -374,14 +386,37 @@ class Stage {
     gl.bindBuffer(gl.ARRAY_BUFFER, this.lineArray); gl.bufferData(gl.ARRAY_BUFFER, values, gl.DYNAMIC_DRAW);
     this.attribute(program, "place", this.lineArray, 3, {stride: 20});
     this.attribute(program, "at", this.lineArray, 2, {stride: 20, offset: 12});
-    gl.activeTexture(gl.TEXTURE0); gl.bindTexture(gl.TEXTURE_2D, camera.image);
+    LAYERS.forEach((layer, k) => {
+      gl.activeTexture(gl.TEXTURE0 + k); gl.bindTexture(gl.TEXTURE_2D, camera.layers[layer].texture);
+      gl.uniform1i(this.uniform(program, layer), k);
+    });
+    gl.activeTexture(gl.TEXTURE0);
     gl.uniformMatrix4fv(this.uniform(program, "view"), false, matrix);
-    gl.uniform1f(this.uniform(program, "mask"), this.acts.pictures() ? 0 : 1);
+    gl.uniform2fv(this.uniform(program, "shown"), shown);
     gl.uniform1f(this.uniform(program, "opacity"), opacity);
     gl.uniform3fv(this.uniform(program, "person"), this.paint("--mask"));
     if (behind) gl.depthMask(false);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
     gl.depthMask(true);
+  }
+
+  // A detector's keypoints in a camera's picture: [x, y], from -1 to 1, the side's colour, 0..255, the confidence.
+  crosses(camera, frame) {
+    const {keypoints, sides} = camera, out = [];
+    for (let k = 0; keypoints && this.shown.keypoints && k < sides.length; k++) {
+      const [x, y, sure] = [0, 1, 2].map(n => keypoints[3 * (frame * sides.length + k) + n] / 10000);
+      if (sure) out.push([[x, y], this.data.sides[sides[k]], sure]);
+    }
+    return out;
+  }
+  crossLines(camera, frame) {
+    const arm = 0.03, slim = arm * camera.tan[1] / camera.tan[0], away = 0.99 * this.reach;
+    return this.crosses(camera, frame).flatMap(([[x, y], colour, sure]) => [[slim, 0], [0, arm]].map(([dx, dy]) =>
+      [this.ahead(camera, away, [x - dx, y - dy]), this.ahead(camera, away, [x + dx, y + dy]), [...colour.map(value => value / 255), sure], 1]));
+  }
+  rays(frame) {
+    return !this.shown.rays ? [] : this.cameras.flatMap(camera => this.crosses(camera, frame).map(([at, colour, sure]) =>
+      [camera.centre, this.ahead(camera, Math.hypot(...V.sub(camera.centre, this.middle)) + this.size / 2, at), [...colour.map(value => value / 255), sure / 2], 0.6]));
   }
 
   floor() {
@@ -407,7 +442,15 @@ class Stage {
   linesOf(figure, frame) {
     const n = this.at(figure, frame), out = [];
     if (n < 0) return out;
-    const truth = figure.kind == "truth";
+    const truth = figure.kind == "truth", over = this.through !== null && !truth;
+    if (over)  // the body shows what is behind it: its bones in the sides' colours, those of doubtful limbs dashed
+      for (const [width, paint] of [[3.6, () => [0, 0, 0]], [2.6, joint => this.data.sides[figure.jointSides[joint]]]])
+        for (const [a, b] of figure.bones) {
+          const [start, end] = [this.joint(figure, n, a), this.joint(figure, n, b)], along = start && end && V.sub(end, start);
+          const pieces = figure.doubtful && figure.doubtful[n * figure.limbs + figure.jointLimbs[b]] ? 7 : 1;
+          for (let k = 0; along && k < pieces; k += 2)
+            out.push([V.add(start, along, k / pieces), V.add(start, along, (k + 1) / pieces), [...paint(b).map(value => value / 255), 1], width]);
+        }
     if (truth && !figure.array)
       for (const [width, colour] of [[1.9, [...this.paint("--paper"), 0.9]], [0.9, [...this.paint("--truth"), 1]]])
         for (const [a, b] of figure.bones) {

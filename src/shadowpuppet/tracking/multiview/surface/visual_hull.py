@@ -46,6 +46,10 @@ class SurfacePoints(NamedTuple):
         return SurfacePoints(self.points[which], self.normals[which], self.weights[which], self.cameras[which])
 
 
+NO_SURFACE = SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))
+"""Where nothing is seen."""
+
+
 class _View(NamedTuple):
     """Arrays of a camera for the kernels."""
 
@@ -111,7 +115,7 @@ class VisualHull:
         """
         people = self.people(masks)
         if len(people) < 2:
-            return SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))
+            return NO_SURFACE
         silhouettes = [_silhouette(mask, self._views[n]) for n, mask in people.items()]
         return self._sampled(*self._edges(silhouettes, np.array(list(people))))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 
 from shadowpuppet.camera.bits import Bits
@@ -26,7 +27,8 @@ class RigWatch:
             self._watch.aside.note(seconds, ["blind" if is_blind(mask) else "" for mask in seen.masks])
             return seen
         kept = self._steps(seconds, self._watch(seconds, seen.masks))
-        return seen._replace(masks=kept, keypoints=tuple(None if mask is None else each for mask, each in zip(kept, seen.keypoints)))
+        found = (None if aside else each for aside, each in zip(map(operator.is_not, kept, seen.masks), seen.keypoints))
+        return seen._replace(masks=kept, keypoints=tuple(found))
 
     def tracked(self, drawn: Sequence[Bits]) -> None:
         """The body of the first frame set that has none yet, as `StepWatch.tracked` expects it."""
