@@ -34,7 +34,7 @@ USUAL, UNUSUAL = 1.7, 0.3
 WIDE, HEAD = 0.22, 0.11
 """Half the width of what a figure explains, at trunk and legs and at the head, metres."""
 ROWS = np.array([len(TRUNK), len(LEGS), len(ASIDE)])
-NONE, NEW, KNOWN, SHADE = 0, 1, 2, 3
+NONE, NEW, KNOWN, SHADE = range(4)
 """What a pixel is: no silhouette, silhouette that no body explains, silhouette that may be another's, and what was taken for shadow, which
 may be a dark limb."""
 

@@ -9,7 +9,7 @@ from shadowpuppet.jit import device, kernel, reduction_kernel
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, closest_on_part, closest_point, nearest, place_parts
 from shadowpuppet.tracking.multiview.refinement.part_sums import add_descendants, is_first_of_part, sum_by_joint
 
-UNBOUNDED, LINEAR, QUADRATIC = 0, 1, 2
+UNBOUNDED, LINEAR, QUADRATIC = range(3)
 """rho of eq. 32; the quadratic one is divided by tau, so that all have the same bound."""
 
 

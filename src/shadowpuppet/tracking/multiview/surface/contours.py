@@ -22,7 +22,7 @@ SAFE_DISTANCE = 2 * SMOOTHING_ROUNDS + VERTEX_STRIDE * TANGENT_ARM
 """Vertices nearer than this to unknown pixels are neither smoothed nor counted as a person's outline."""
 BORDER_STRIDE = 16
 """Along the picture's border every `BORDER_STRIDE`-th vertex is kept, and every corner."""
-INSIDE, UNKNOWN, VISITED = 1, 2, 4
+INSIDE, UNKNOWN, VISITED = (1 << bit for bit in range(3))
 """Bits of a pixel while contours are followed."""
 
 
