@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.bits import Bits, count, pack, unpack
-from shadowpuppet.camera.colour_codes import LEVELS, NUMBER, ColourCode, step_of, thinned
+from shadowpuppet.camera.colour_codes import NUMBER, ColourCode, step_of, thinned
 from shadowpuppet.camera.mask import Mask, grown
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
@@ -40,11 +40,8 @@ WELL = 0.8
 """Least overlap of body and silhouette at which colours are learnt."""
 RARE = 1e-5
 """Added to every colour's frequency: one that is hardly seen says nothing."""
-NEIGHBOURS = 0.2
-"""Share of a colour's pixels that each neighbour gets, along each channel, as noise and shading change a colour a little."""
-ABOUT_HEAD, ABOUT_ARMS, EDGE = 4, 3, 1
-"""Bodies do not fit to the pixel: within the first distance (pixels at 320 x 240) of the head, whose skin may have the hands' colour, no
-pixel counts; within the others, of the arms and of other parts' edges, no colour is learnt."""
+EDGE = 1
+"""Bodies do not fit to the pixel: within this distance (pixels) of parts' edges no colour is learnt."""
 
 
 class ColourCounts(NamedTuple):
@@ -66,7 +63,7 @@ class ArmColours:
         last = ColourCounts(*np.zeros((3, NUMBER), np.int64)) if counts is None else counts
         hand, forearm, upper, head, rest = (thinned(self.drawn(pose, kind)) for kind in KINDS)
         others, arms = rest | head | upper, hand | forearm | upper
-        shown = (hand & ~others, grown(forearm, -EDGE) & ~grown(others, EDGE), grown(rest, -EDGE) & ~grown(arms, ABOUT_ARMS) & ~head)
+        shown = (hand & ~others, grown(forearm, -EDGE) & ~grown(others, EDGE), grown(rest, -EDGE) & ~grown(arms, EDGE) & ~head)
         own = thinned(mask)
         return ColourCounts(*(each + np.bincount(codes[pixels & own], minlength=NUMBER) for each, pixels in zip(last, shown)))
 
@@ -81,7 +78,7 @@ class ArmColours:
             return None
         step, found = step_of(self.picture.camera.size), coloured(of_arms, codes, thinned(mask))
         found = found.repeat(step, 0).repeat(step, 1)[: mask.shape[0], : mask.shape[1]] & mask
-        apart = grown(self.drawn(pose, "head"), ABOUT_HEAD * step) | ~self._before_trunk(found, pose, step)
+        apart = self.drawn(pose, "head") | ~self._before_trunk(found, pose, step)
         ignored = ignore | pack(apart) | self.picture.leg_bits(pose)
         return PartObservation(Observation(pack(found) | ignored, ignored), tuple(self.parts_of(kinds)))
 
@@ -163,12 +160,5 @@ def distinct(counts: ColourCounts, outermost: str = "hand") -> tuple[tuple[str, 
 
 
 def _frequencies(numbers: NDArray[np.int64]) -> Array:
-    """Frequencies (4096,) of colours seen in numbers of pixels, smoothed along each channel."""
-    found = numbers.reshape((LEVELS,) * 3) / max(numbers.sum(), 1)
-    for axis in range(3):
-        along = np.moveaxis(found, axis, 0)
-        smooth = (1 - 2 * NEIGHBOURS) * along
-        smooth[1:] += NEIGHBOURS * along[:-1]
-        smooth[:-1] += NEIGHBOURS * along[1:]
-        found = np.moveaxis(smooth, 0, axis)
-    return found.ravel()
+    """Frequencies (4096,) of colours seen in numbers of pixels."""
+    return numbers / max(numbers.sum(), 1)

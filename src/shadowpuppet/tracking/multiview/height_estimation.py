@@ -20,6 +20,7 @@ from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation
+from shadowpuppet.tracking.multiview.pose_search import STRAY
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MIN_POINTS, MultiviewTracker
@@ -34,8 +35,6 @@ large bodies fit, up to the walls of the hull."""
 PENALTY, DEVIATION = 0.02, 0.1
 """Relative cost of a height that deviates from the average by `DEVIATION` (m), that of adults in ANSUR II (Gordon et al. 2014), women and
 men together; it grows with the square, and is bounded for the sake of children."""
-STRAY = 2
-"""Number of points at each end of an extent that may be noise."""
 
 
 class FirstFrame(NamedTuple):

@@ -32,8 +32,8 @@ ARM_ROUNDS, ARM_SAMPLES, ARM_SPREAD = 2, 600, 0.6
 """Number of searches for each arm of the best pose, candidates per search, and their noise about the usual arms (rad)."""
 EMPTINESS = 2.0
 """Weight of limbs that reach out of the silhouettes (see `Pass`): without it, poses are drawn to furniture that the hull contains."""
-STRAY = 3
-"""Number of the lowest surface points that may be noise."""
+STRAY = 2
+"""Number of surface points at each end of the hull that may be noise."""
 PULL = 1e-4
 """Weight of the pull to the posture before refinement (see `Refiner.gauss_newton`)."""
 
@@ -126,4 +126,4 @@ def stood(body: Body, poses: Array, lowest: float) -> Array:
 def _lowest(points: Array) -> float:
     """Height of the lowest of the surface points (P, 3) that are no noise, metres."""
     heights = np.sort(points[:, 2])
-    return float(heights[min(STRAY, len(heights)) - 1])
+    return float(heights[min(STRAY, len(heights) - 1)])

@@ -9,13 +9,11 @@ import numpy as np
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.frozen import LEAST
+from shadowpuppet.tracking.recovery import OVERLAP_DROP
 
-FALL = 0.2
-"""Fall of a camera's overlap below the usual one from which on it is asked which one the others fit better without."""
-SUSPECT = 0.03
-"""The same from which on a camera may be that one: the body may have followed the wrong camera, and left a good one."""
 GAIN = 0.03
-"""Least gain of the others' mean overlap without it."""
+"""Least gain of the others' mean overlap without the odd camera; and the fall of a camera's own overlap below the usual one from which on
+it may be that one: the body may have followed the wrong camera, and left a good one. One must have fallen by `OVERLAP_DROP`."""
 ADAPT, ADAPT_ODD = 0.1, 0.03
 """Weight of a frame in the usual overlap, and that of a frame in which the camera is the odd one: in the end it is heard again."""
 
@@ -25,7 +23,7 @@ def suspects(usual: Array, now: Array) -> list[int]:
     if usual.shape != now.shape or np.isfinite(now).sum() <= LEAST:
         return []
     fall = np.nan_to_num(usual - now, nan=0.0)
-    return np.flatnonzero(fall > SUSPECT).tolist() if fall.max() > FALL else []
+    return np.flatnonzero(fall > GAIN).tolist() if fall.max() > OVERLAP_DROP else []
 
 
 def odd_one(usual: Array, now: Array, without: Mapping[int, Array]) -> int | None:
@@ -35,7 +33,7 @@ def odd_one(usual: Array, now: Array, without: Mapping[int, Array]) -> int | Non
         return float(np.nanmean(np.delete(without[odd] - usual, odd)))
 
     best = max(without, key=gain, default=None)
-    if best is None or not usual[best] - without[best][best] > FALL:
+    if best is None or not usual[best] - without[best][best] > OVERLAP_DROP:
         return None
     return best if np.nanmean(np.delete(without[best] - now, best)) > GAIN else None
 

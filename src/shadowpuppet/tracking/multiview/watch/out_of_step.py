@@ -21,9 +21,9 @@ MEMORY = 1.0
 """Time (s) in which what was seen counts for 1/e."""
 ENOUGH = 0.5
 """Change of the drawn body over the area of the silhouette, summed, that a verdict needs."""
-LATE, IN_STEP = 0.35, 0.0
-"""Share of the body's change, by which another moment's body explains the silhouette better, from which on a camera is out of step; and up
-to which one is taken back. It is -1 if the silhouette is exactly the present body, 1 if it is the other's."""
+LATE = 0.35
+"""Share of the body's change, by which another moment's body explains the silhouette better, from which on a camera is out of step. It is
+-1 if the silhouette is exactly the present body, 1 if it is the other's; below 0 a camera is taken back."""
 MOST = 1.5
 """The same, beyond which older evidence gives way to newer."""
 OTHERS = 0.5
@@ -130,10 +130,10 @@ class StepWatch:
             others = [other for m, other in enumerate(best) if m != n and not self._out[m] and (self._short[m] or not lossy)]
             alone = np.isfinite(gain) and all(other < OTHERS * gain for other in others)
             against = share[n, (lag + len(LAGS)) % (2 * len(LAGS))]  # a body that jitters explains neither moment
-            clear = bool(gain > LATE and alone and against < IN_STEP and explained[n, lag])
+            clear = bool(gain > LATE and alone and against < 0 and explained[n, lag])
             if not self._out[n]:  # most cameras decide what the time is
                 clear = clear and 2 * sum(map(bool, self._out)) + 2 < len(best)
                 self._out[n] = ("late" if lag < len(LAGS) else "early") if clear else ""
-            elif gain < IN_STEP and not (self._short[n] and self._out[n] == "early"):  # lost frames do not come back
+            elif gain < 0 and not (self._short[n] and self._out[n] == "early"):  # lost frames do not come back
                 self._out[n] = ""
         return tuple(self._out)
