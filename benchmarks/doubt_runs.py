@@ -192,8 +192,9 @@ def track_monocular(path: Path) -> Iterator[Tracked]:
                       off, np.array(deviations), np.array(statuses), model.modes)
 
 
-SIGHTINGS = (("mediapipe", False), ("mediapipe", True), ("poor", False), ("poor", True))
-"""Detectors, and whether two cameras alone are used."""
+SIGHTINGS = {"keypoints": (("mediapipe", 0), ("mediapipe", 2), ("poor", 0), ("poor", 2)), "keypoints_one": (("mediapipe", 1), ("poor", 1)),
+             "both": (("mediapipe", 0), ("poor", 0))}  # fmt: skip
+"""For each kind of doubt detectors, and the number of cameras; 0: all."""
 BESIDE = ("second person", "obstacle", "thing", "grown")
 """Faults of silhouettes that are tried beside keypoints."""
 ONE_CAMERA = ("frozen", "obstacle", "thing", "late")
@@ -202,21 +203,20 @@ LATE = 5
 """Frames by which the camera is late."""
 
 
-def track_multiview(path: Path, evidence: str = "silhouettes") -> Iterator[Tracked]:
-    """A recording of several cameras with every fault, and each of `SIGHTINGS` if keypoints are evidence. Errors are those of the smoothed
+def track_multiview(path: Path, kind: str = "multiview") -> Iterator[Tracked]:
+    """A recording of several cameras with every fault, or each of `SIGHTINGS` if keypoints are evidence. Errors are those of the smoothed
     motion, which is what a run's deviations are stated of: the backward pass keeps feet on the floor."""
     late: Fault = lambda rng, masks, rate: [masks[max(n - LATE, 0)] for n in range(len(masks))]  # noqa: E731
-    if evidence == "silhouettes":
-        yield from tracked_with(path, make_options({"evidence": evidence}), FAULTS | {"late": late})
-        return
-    for detector, paired in SIGHTINGS:
+    if kind == "multiview":
+        yield from tracked_with(path, make_options({"evidence": "silhouettes"}), FAULTS | {"late": late})
+    for detector, cameras in SIGHTINGS.get(kind, ()):
         known = with_keypoints(path, detector)
-        options = {"evidence": evidence} | ({"camera": ",".join(across(known))} if paired else {})
-        beside = BESIDE if "silhouettes" in evidence and detector == "mediapipe" and not paired else ()
-        faults = {name: FAULTS[name] for name in ("clean", *beside)}
+        options = {"evidence": "silhouettes,keypoints" if kind == "both" else "keypoints"}
+        options |= {"camera": ",".join(across(known)[:cameras])} if cameras else {}
+        faults = {name: FAULTS[name] for name in ("clean", *(BESIDE if kind == "both" and detector == "mediapipe" else ()))}
         for run in tracked_with(known, make_options(options), faults):
-            said = f"{detector}, {run.fault}" if run.fault != "clean" or detector != "mediapipe" else "clean"
-            yield replace(run, recording=path.name, fault=f"{said}, two cameras" if paired else said)
+            is_clean = detector == "mediapipe" and cameras < 2 and run.fault == "clean"
+            yield replace(run, recording=path.name, fault="clean" if is_clean else f"{detector}, {cameras or 'all'} cameras, {run.fault}")
 
 
 def tracked_with(path: Path, options: Options, faults: Mapping[str, Fault]) -> Iterator[Tracked]:
@@ -299,10 +299,8 @@ def _rings() -> list[Path]:
     return [RINGS / spec.name for spec in proving_rings()]
 
 
-TRACK = {"monocular": track_monocular, "multiview": track_multiview, "keypoints": partial(track_multiview, evidence="keypoints"),
-         "both": partial(track_multiview, evidence="silhouettes,keypoints")}  # fmt: skip
-MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND), "multiview": _rings, "keypoints": _rings,
-                                             "both": _rings}  # fmt: skip
+TRACK = {"monocular": track_monocular, "multiview": track_multiview, **{kind: partial(track_multiview, kind=kind) for kind in SIGHTINGS}}
+MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND), **dict.fromkeys(("multiview", *SIGHTINGS), _rings)}
 
 
 def read_runs(files: Iterable[Path]) -> list[Tracked]:

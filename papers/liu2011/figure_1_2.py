@@ -13,7 +13,8 @@ from shadowpuppet.body.models import make_body
 from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.body.sizes import SUBSETS, CardboxSizes
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.drawing import draw_model, write_text
+from shadowpuppet.camera.captions import WHITE, strip
+from shadowpuppet.camera.drawing import draw_model
 from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.geometry import Array, rigid, rotation_about
 from shadowpuppet.video import Image
@@ -62,8 +63,7 @@ def model(name: str, sizes: CardboxSizes) -> Image:
     out[:] = np.uint8(0.55 * out + 0.45 * PAPER)
     draw_skeleton(out, picture, pose)
     draw_axes(out, picture)
-    write_text(out, f"{'volumetric' if name == 'boxes' else name}: {len(body.parts)} planes", 0, (235, 235, 235), size=480)
-    return out
+    return np.concatenate([strip(TILE, [[(f"{'volumetric' if name == 'boxes' else name}: {len(body.parts)} planes", WHITE)]]), out])
 
 
 def draw_skeleton(out: Image, picture: Picture, pose: Array) -> None:

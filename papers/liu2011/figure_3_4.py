@@ -8,7 +8,8 @@ from papers.common.experiment import Experiment, Outcome, Request, Table
 from papers.liu2011.material import Case, cases
 from papers.liu2011.repeats import repeat
 from papers.liu2011.shown import stem, told
-from shadowpuppet.camera.drawing import in_colour, write_text
+from shadowpuppet.camera.captions import WHITE, strip
+from shadowpuppet.camera.drawing import in_colour
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.pipeline.footage import take_sample
 from shadowpuppet.silhouette import SilhouetteSettings, learn_background
@@ -70,7 +71,7 @@ def row(tiles: dict[str, Image | None]) -> Image:
         assert tile is not None
         size = round(tile.shape[1] * SCALE), round(tile.shape[0] * SCALE)
         large = np.asarray(cv2.resize(tile, size, interpolation=cv2.INTER_NEAREST), np.uint8)
-        write_text(large, name, 0, (255, 255, 255), size=380)
+        large = np.concatenate([strip(size[0], [[(name, WHITE)]]), large])
         out.append(np.pad(large, ((0, 0), (0, 4), (0, 0)), constant_values=128))
     return np.concatenate(out, axis=1)
 

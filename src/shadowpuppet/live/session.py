@@ -229,6 +229,7 @@ class CameraSession(LiveSession[Snapshot, State, ColouredMask, Before]):
         if segment is None:
             return Seen(())
         found = segment(CameraFrame(shot.captured, only(images), None))
+        assert found is not None
         return Seen((found.mask,), codes=(colour_codes(found.image),))
 
     def _forget_time(self) -> None:

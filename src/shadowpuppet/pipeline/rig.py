@@ -140,7 +140,7 @@ def open_rig(path: str | Path, options: Options) -> Rig:
     recording = open_recording(path, options)
     views = chosen_views(recording, options.camera)
     others = [source for view in recording.views if not any(view is each for each in views)
-              for source in (view.video, view.background, view.masks)]
+              for source in (view.video, view.background, view.masks, view.keypoints and view.keypoints.path)]
     if options.background is not None and len(views) > 1:
         raise SettingsError(f"background: found one for {len(views)} cameras, expected one each, background/<camera>.* in the recording")
     if (options.people or 1) > 1 and len(views) == 1:

@@ -15,7 +15,7 @@ from shadowpuppet.io.inputs.inputs import Inputs, fingerprint, inputs_of
 from shadowpuppet.io.inputs.same_run import INPUTS, check_same, write_inputs
 
 FILES = ("calibration.toml", "recording.toml", "video/a.mp4", "video/b.mp4", "background/a.png", "masks/a/1.png", "masks/a/2.png",
-         "references/front_t_pose.png", "truth.csv", "training.csv")
+         "references/front_t_pose.png", "keypoints/a.npz", "truth.csv", "training.csv")
 PARTS = {*FILES, "masks/a"} - {"masks/a/1.png", "masks/a/2.png"}
 
 
@@ -132,7 +132,7 @@ def test_many_changes_are_listed_in_short(lab):
     assert inputs.changed() == "calibration.toml and recording.toml have changed"
     for name in FILES:
         os.utime(lab / name, (1, 1))
-    assert inputs.changed().endswith(" and 6 more have changed")
+    assert inputs.changed().endswith(" and 7 more have changed")
 
 
 def test_parts_that_are_not_used_are_left_out(lab):

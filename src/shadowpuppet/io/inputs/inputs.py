@@ -18,12 +18,12 @@ from shadowpuppet.io.inputs.content import content_of
 from shadowpuppet.io.projects import LEVELS, films_in, find_project
 from shadowpuppet.video import FILM_SUFFIXES, IMAGE_SUFFIXES
 
-FOLDERS = ("video", "background", "masks", "references")
-"""Folders of a recording with a film, a picture or a folder of pictures for each camera or posture."""
+FOLDERS = ("video", "background", "masks", "references", "keypoints")
+"""Folders of a recording with a film, a picture, a folder of pictures or keypoints for each camera or posture."""
 PATTERNS = ("calibration.toml", "recording.toml", "truth.*", "truth_*.csv", "training.*")
 """Its other files."""
 READ = {*FILM_SUFFIXES, *IMAGE_SUFFIXES, *ENDINGS, ".csv"}
-"""Endings of files that are read in a folder of pictures or of calibrations; programs that show folders put other files there."""
+"""Endings of files that are read in a folder of pictures, calibrations or keypoints; programs that show folders put other files there."""
 MOST_NAMED = 3
 """Greatest number of files that a sentence names."""
 
@@ -120,7 +120,7 @@ def _parts(folder: Path) -> Iterator[Path]:
     if calibration is not None:
         yield calibration
     if project is not None:
-        yield from project.films.values()
+        yield from (*project.films.values(), *project.keypoints.values())
         yield from (level / "Config.toml" for level in (project.folder, *list(project.folder.resolve().parents)[:LEVELS]))
         yield project.folder / "sessionMetadata.yaml"
 

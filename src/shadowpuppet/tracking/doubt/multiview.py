@@ -199,8 +199,10 @@ def _look_up(points, limbs, T, lens, mask, seen, out):  # pragma: no cover
 
 
 def kind_of(masks: Sequence[Mask | None], keypoints: KeypointEvidence | None) -> str:
-    """The calibrated model of doubt by what is seen: `multiview`, `keypoints` or `both`."""
-    return "multiview" if keypoints is None else "keypoints" if all(mask is None for mask in masks) else "both"
+    """The calibrated model of doubt by what is seen: `multiview`, `keypoints`, `keypoints_one` of one camera, or `both`."""
+    if keypoints is None or any(mask is not None for mask in masks):
+        return "multiview" if keypoints is None else "both"
+    return "keypoints" if keypoints.cameras > 1 else "keypoints_one"
 
 
 def count_still(before: Before | None, masks: Sequence[Mask | None]) -> int:

@@ -79,7 +79,7 @@ def without_side(name: str) -> str:
 
 @cache
 def variance_model(kind: str) -> VarianceModel:
-    """The calibrated model of `monocular` tracking, or of several cameras': by silhouettes (`multiview`), by `keypoints`, by `both`."""
+    """A calibrated model: of `monocular` tracking, or one that `doubt.multiview.kind_of` names."""
     table = tomllib.loads(resources.files("shadowpuppet.tracking.doubt").joinpath(TABLE).read_text("utf-8"))[kind]
     own = [table[group if group in table else LIKE[group]] for group in GROUPS]
     factors = np.array([[group[axis] for axis in "xyz"] for group in own], float)

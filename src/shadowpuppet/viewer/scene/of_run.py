@@ -66,12 +66,12 @@ class _Run:
         if measured is not None and measured.truth is not None:
             figures.append(joint_figure("truth", measured.truth, "truth"))
         filmed = self.film_cameras if self.recording else self._tried(problems, "the films are not shown", lambda: self.film_cameras)
-        films = filmed is not None
+        again = filmed is not None and self.options.uses_silhouettes
         cameras = filmed if filmed is not None else self.kept_cameras
-        cloud = self._tried(problems, "particles are not shown", lambda: self.rerun(cameras)) if films and body is not None else None
+        cloud = self._tried(problems, "particles are not shown", lambda: self.rerun(cameras)) if again and body is not None else None
         charts = [*(errors_of(measured) if measured is not None else ()), *fit_of(motion), *angles_of(motion)]
         return Stage(title=self.name, times=motion.times, figures=tuple(figures), cameras=cameras, charts=tuple(charts), facts=self.facts,
-                    hull=hull_function(cameras, self.options) if films else None, cloud=cloud, problems=tuple(problems),
+                    hull=hull_function(cameras, self.options) if again else None, cloud=cloud, problems=tuple(problems),
                     notes=() if np.isfinite(motion.joint_sd).any() else (UNSTATED,))
 
     @property
