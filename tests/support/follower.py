@@ -39,6 +39,9 @@ class Follower:
         self.calls.append("step")
         return self._there(rng, points, masks) if len(points.points) else state._replace(status="lost")
 
+    def shown(self, *_) -> None:
+        """No keypoints."""
+
     def _there(self, rng, points, masks) -> Standing:
         pose = np.zeros(len(self.body.skeleton.dofs))
         pose[:3] = points.points.mean(0) + rng.normal(0, 1e-3, 3)

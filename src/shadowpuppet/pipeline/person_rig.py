@@ -156,7 +156,6 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
     """Fit the person to `views`, masks by time and camera, and make the tracker for `rate` frames/s; `both_fronts` as in `estimate_sizes`.
     `keypoints`: of the same times and cameras; empty without any. Raises the errors of `fit_multiview`."""
     settings = options.multiview
-    cameras = [replace(camera, oriented=True) for camera in cameras]  # one that stands alone has a world of its own
     hull = VisualHull(cameras, settings.hull) if options.uses_silhouettes else None
     known = familiar(rng, options, training, settings.body, rate)
     first = [FirstFrame(NO_SURFACE if hull is None else hull.points(masks), masks, keypoints[n] if keypoints else ())

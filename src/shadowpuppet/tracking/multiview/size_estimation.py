@@ -25,7 +25,7 @@ from shadowpuppet.tracking.keypoints.sights import NO_SIGHTS
 from shadowpuppet.tracking.multiview.bundle_adjustment import Measured, solve_bundle
 from shadowpuppet.tracking.multiview.height_estimation import FRAMES, First, FirstFrame, first_frames
 from shadowpuppet.tracking.multiview.keypoint_evidence import opening_heading
-from shadowpuppet.tracking.multiview.observation import MultiviewObservation
+from shadowpuppet.tracking.multiview.observation import MultiviewObservation, middle_of
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -203,7 +203,7 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
     costs = [float(np.mean([state.cost for _, state in frames])) for *_, frames in (best, turned)]
     estimate, _, found = best if costs[0] <= costs[1] else turned
     index, state = found[0]
-    middle = first[index][0].points.mean(0)
+    middle = middle_of(first[index].points)
     return replace(estimate, front=Front(heading_of(estimate.body, state.pose), middle, max(costs) / min(costs) - 1))
 
 
