@@ -1,6 +1,6 @@
 """The factors of doubt (`tracking.doubt`), chosen on made recordings, clean and spoiled, and how well they hold on recordings left out.
 
-    python benchmarks/calibrate_doubt.py [--kind monocular,multiview] [--write] [--markdown docs/doubt.md] [--test RECORDING ...]
+    python benchmarks/calibrate_doubt.py [--kind KIND,...] [--write] [--markdown docs/doubt.md] [--test RECORDING ...]
 
 Every recording of the proving grounds (`synthetic.proving_ground`, `proving_rings`; made in build where they are missing) is tracked clean
 and with each fault of `FAULTS` in its silhouettes; components of doubt and errors are kept in build/doubt. The factors of a group of joints
@@ -357,7 +357,7 @@ def _smallest(folder: Path) -> list[object]:
 def main() -> None:
     """Parse, run, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--kind", default="monocular,multiview", help="trackers, separated by commas")
+    parser.add_argument("--kind", default="monocular,multiview,keypoints,keypoints_one,both", help="models, separated by commas")
     parser.add_argument("--recordings", type=Path, nargs="*", help="folders; the proving grounds without")
     parser.add_argument("--test", type=Path, nargs="*", default=[], help="recordings with truth that nothing is fitted to")
     parser.add_argument("--folder", type=Path, default=BUILD, help="where components and errors are kept")
