@@ -35,6 +35,7 @@ def with_keypoints(recording: Path, folder: Path, scale: float = 1.0, frames: in
     (folder / "keypoints").mkdir()
     for n, camera in enumerate(made_rig.cameras()):
         xy, sure = (np.array([getattr(of[n], what)[0] for of in found]) for what in ("xy", "confidence"))
+        xy, sure = xy.reshape(frames, len(MARKS.names), 2), sure.reshape(frames, len(MARKS.names))
         film = film_keypoints(MARKS.names, np.arange(frames), np.zeros(frames, int), xy, sure, "made", camera.size)
         write_keypoints(folder / "keypoints" / f"{camera.name}.npz", film)
     return folder
