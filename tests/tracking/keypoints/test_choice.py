@@ -49,8 +49,9 @@ def test_without_silhouettes_the_person_is_one_whose_rays_meet_in_all_cameras():
     people, middle = person_between(CAMERAS, keypoints, MARKS)
     assert people in ((0, 0, 1, 0, 0), (1, 1, 0, 1, 1))
     assert np.abs(middle - (OTHER if people[0] == 0 else OWN).mean(0)).max() < 1e-3
-    alone = person_between(CAMERAS, [keypoints[0], *[None] * 4], MARKS)[0]
-    assert alone == (0, *[None] * 4)
+    small = 100 + 0.5 * keypoints[0].xy[:1]
+    both_sizes = Keypoints(MARKS.names, np.concatenate([small, keypoints[0].xy[:1]]), keypoints[0].confidence, np.array([1, 2]), "made")
+    assert person_between(CAMERAS, [both_sizes, *[None] * 4], MARKS)[0] == (1, *[None] * 4)
 
 
 def test_the_height_follows_from_the_bones_between_landmarks():

@@ -12,6 +12,7 @@ from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.tracking.doubt.doubt import STEP, limit_deviations
+from shadowpuppet.tracking.keypoints.candidates import CHAINS
 from shadowpuppet.tracking.keypoints.definitions import ARMS, LEGS, Landmarks
 from shadowpuppet.tracking.keypoints.likelihood import pulls, surprises
 from shadowpuppet.tracking.keypoints.sights import NEAR, Sights
@@ -27,7 +28,7 @@ class KeypointView(NamedTuple):
     components: dict[str, Array]
     """Lengths (L, 3), metres, by name: `posterior`, `apart` and `exchanged`."""
     known: Array
-    """Share of each of `LIMBS` whose landmarks two cameras show where the body has them, or the only camera, (5,)."""
+    """Share of the joints of each of `LIMBS` that two cameras, or the only one, show where the body has them, (5,)."""
 
 
 def keypoint_view(body: Body, pose: Array, seen: KeypointEvidence) -> KeypointView:
@@ -50,7 +51,8 @@ def keypoint_view(body: Body, pose: Array, seen: KeypointEvidence) -> KeypointVi
     components = {"posterior": _posterior(places, joints, seen, skeleton.limits), "apart": np.repeat(apart[by_joint, None], 3, 1),
                   "exchanged": np.sqrt(share)[:, None] * counterparts}
     near = np.bincount(sights.landmarks[squares < NEAR**2], minlength=len(marks.names)) >= min(2, seen.cameras)
-    return KeypointView(components, np.array([near[own].mean() for own in limbs]))
+    joint = np.isin([name.partition("_")[2] for name in marks.names], CHAINS)  # which all detectors have
+    return KeypointView(components, np.array([near[own & joint].mean() for own in limbs]))
 
 
 def _limbs_of(marks: Landmarks) -> list[NDArray[np.bool_]]:

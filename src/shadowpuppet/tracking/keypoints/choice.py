@@ -49,7 +49,8 @@ def people_at(points: Array, cameras: Sequence[Camera], keypoints: Sequence[Keyp
 
 def person_between(cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None], landmarks: Landmarks) -> tuple[People, Array]:
     """The person whose rays meet best: an index for each camera, and the middle (3,) of the landmarks, world. The two pictures with the
-    most rays to common points begin, and the other cameras' persons nearest to these points follow."""
+    most rays to common points begin, and the other cameras' persons nearest to these points follow. If one picture alone shows persons,
+    the largest in it."""
     number, middle = len(cameras), np.mean([camera.centre for camera in cameras], axis=0)
     seen = [(n, person) for n, each in enumerate(keypoints) if each is not None for person in range(len(each.person))]
 
@@ -64,7 +65,7 @@ def person_between(cameras: Sequence[Camera], keypoints: Sequence[Keypoints | No
 
     pairs = [pair for pair in combinations(seen, 2) if pair[0][0] != pair[1][0]]
     if not pairs:
-        return tuple(next((person for m, person in seen if m == n), None) for n in range(number)), middle
+        return tuple(_largest(each) for each in keypoints), middle
     first = max(pairs, key=lambda pair: met(*pair)[0])
     places = met(*first)[1]
     if not np.isfinite(places).all(1).any():
@@ -72,3 +73,12 @@ def person_between(cameras: Sequence[Camera], keypoints: Sequence[Keypoints | No
     middle = np.nanmean(places, axis=0)
     others = people_at(np.where(np.isfinite(places), places, middle), cameras, keypoints, landmarks)
     return tuple(dict(first).get(n, other) for n, other in enumerate(others)), middle
+
+
+def _largest(keypoints: Keypoints | None) -> int | None:
+    """Index of the person whose landmarks are spread widest in a picture; None without persons."""
+    if keypoints is None or not len(keypoints.person):
+        return None
+    known = np.isfinite(keypoints.xy).all(2)
+    spread = [float(np.ptp(xy[here], axis=0).max(initial=0)) if here.any() else 0.0 for xy, here in zip(keypoints.xy, known)]
+    return int(np.argmax(spread))
