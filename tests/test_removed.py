@@ -54,6 +54,11 @@ def test_a_removed_setting_that_changed_nothing_is_left_out(tmp_path):
     assert (read.seed, read.silhouette.factor) == (3, 3.0)
 
 
+def test_a_weight_in_its_former_unit_is_left_out_as_its_default_was():
+    assert make_options({"multiview": {"keypoints": 0.25}}).multiview.keypoints == make_options({}).multiview.keypoints
+    assert make_options({"multiview": {"keypoints": 2e-4}}).multiview.keypoints == 2e-4
+
+
 def test_what_is_not_removed_is_kept():
     values = {"seed": 3, "silhouette": {"method": "mog2", "factor": 3.0}, "tracker": {"arm": {"particles": 300}}}
     assert of_earlier_run(values) == values

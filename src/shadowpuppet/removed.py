@@ -30,8 +30,10 @@ BOUGUET = ("found a calibration of Bouguet's toolbox, which is not read any more
            "HumanEva becomes a recording by python -m papers.humaneva in the source repository")
 FILES = dict.fromkeys((".cal", ".m", ".mat"), BOUGUET)
 """By the ending of a calibration file."""
-IDLE: dict[str, object] = {"silhouette.maintain": False, "multiview.forces.robust": True, "multiview.gauss_newton.finalists": 0.3}
-"""By the name of a removed setting: the value that changed nothing. Files of earlier versions hold it, and it is left out."""
+IDLE: dict[str, object] = {"silhouette.maintain": False, "multiview.forces.robust": True, "multiview.gauss_newton.finalists": 0.3,
+                           "multiview.keypoints": 0.25}  # fmt: skip
+"""By the name of a removed setting: the value that changed nothing; of one in another unit: its default before. Files of earlier versions
+hold it, and it is left out."""
 
 
 def refuse_tokens(tokens: Sequence[str]) -> None:
