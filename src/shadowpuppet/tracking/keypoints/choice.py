@@ -79,6 +79,5 @@ def _largest(keypoints: Keypoints | None) -> int | None:
     """Index of the person whose landmarks are spread widest in a picture; None without persons."""
     if keypoints is None or not len(keypoints.person):
         return None
-    known = np.isfinite(keypoints.xy).all(2)
-    spread = [float(np.ptp(xy[here], axis=0).max(initial=0)) if here.any() else 0.0 for xy, here in zip(keypoints.xy, known)]
-    return int(np.argmax(spread))
+    known = [xy[np.isfinite(xy[:, 0])] for xy in keypoints.xy]
+    return int(np.argmax([np.ptp(xy, axis=0).max() if len(xy) else 0.0 for xy in known]))
