@@ -92,8 +92,8 @@ class MultiviewObservation:
 
     @property
     def by_keypoints(self) -> bool:
-        """Whether no camera has a silhouette, so that keypoints alone are evidence."""
-        return all(mask is None for mask in self.masks)
+        """Whether keypoints alone are evidence, as no camera has a silhouette."""
+        return self.keypoints is not None and all(mask is None for mask in self.masks)
 
     @cached_property
     def halves(self) -> Halves:
@@ -144,7 +144,7 @@ class MultiviewObservation:
 
     def overlap(self, pose: Array) -> float:
         """Intersection over union of a drawn pose (D,) and the silhouettes, mean of all pictures; 0 if no person is
-        visible in them, and NaN without silhouettes."""
+        visible in them, and NaN if keypoints alone are evidence."""
         if self.by_keypoints:
             return np.nan
         overlaps = self.overlaps(pose)[list(self.seen)]

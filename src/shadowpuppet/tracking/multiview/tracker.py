@@ -330,8 +330,8 @@ class MultiviewTracker:
 
     def is_present(self, observation: MultiviewObservation) -> bool:
         """Whether the surface points are enough, and extended enough, for a person; or, without silhouettes, the keypoints."""
-        if observation.by_keypoints:
-            return observation.keypoints is not None and observation.keypoints.show_person
+        if observation.by_keypoints and observation.keypoints is not None:
+            return observation.keypoints.show_person
         points = observation.surface.points
         return len(points) >= MIN_POINTS and float(np.linalg.norm(np.ptp(points, axis=0))) > MIN_EXTENT
 
