@@ -42,14 +42,12 @@ def test_a_camera_that_freezes_is_set_aside_by_name_and_taken_back():
     assert interval.frames == round((interval.end - interval.begin) * RATE) + 1
 
 
-def test_a_frozen_camera_is_noticed_although_others_add_to_its_silhouette():
-    """Limbs that a camera takes for shadow change with what the others see."""
+def test_keypoints_of_a_frozen_camera_are_set_aside_with_its_silhouette():
     watch, aside = RigWatch(3), []
     for n in range(25):
-        own = [person(n), person(5 if n >= 5 else n), person(n)]
-        masks = [own[0], own[1] | person(n + 3), own[2]]
+        masks = [person(n), person(5 if n >= 5 else n), person(n)]
         keypoints = tuple(Keypoints(("nose",), np.ones((1, 1, 2)), np.ones((1, 1)), np.array([k]), "made") for k in range(3))
-        seen = watch(n / RATE, Seen(tuple(masks), own=tuple(own), keypoints=keypoints))
+        seen = watch(n / RATE, Seen(tuple(masks), keypoints=keypoints))
         kept = seen.masks
         assert [each is None for each in seen.keypoints] == [each is None for each in kept]
         assert all(a is None or a is b for a, b in zip(kept, masks))
@@ -58,6 +56,13 @@ def test_a_frozen_camera_is_noticed_although_others_add_to_its_silhouette():
     assert aside[-1] == [False, True, False]
     (interval,) = watch.intervals
     assert (interval.camera, interval.why) == (1, "frozen")
+
+
+def test_keypoints_without_silhouettes_are_never_set_aside():
+    keypoints = tuple(Keypoints(("nose",), np.ones((1, 1, 2)), np.ones((1, 1)), np.array([k]), "made") for k in range(3))
+    watch, seen = RigWatch(3), Seen((None,) * 3, keypoints=keypoints)
+    assert all(watch(n / RATE, seen).keypoints == keypoints for n in range(25))
+    assert not watch.intervals
 
 
 def test_who_stands_still_freezes_no_camera():
