@@ -104,7 +104,7 @@ def test_its_warnings_are_ours(tmp_path, started):
 
 
 def test_warnings_of_libraries_stay_theirs():
-    """Else a user is told of them as of a problem of the films."""
+    """As warnings of ours, they would name a problem of the films."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         warnings.warn("overflow encountered in cast", RuntimeWarning, stacklevel=1)

@@ -557,7 +557,7 @@ def test_a_file_has_pictures_only_where_they_are_asked_for(tracked, tmp_path):
 
 @pytest.mark.parametrize("fisheye", [False, True])
 def test_keypoints_are_crosses_where_the_undistorted_picture_has_them(fisheye, rng):
-    """Two people in the second of three frames, nobody in the last; confidences and sides as they are."""
+    """Two people in the second of three frames and none in the last, with their confidences and sides."""
     camera = replace(Camera.from_fov((320, 240), 1.2), distortion=np.array([-0.2, 0.05, 0, 0]), fisheye=fisheye)
     names, lens = ("left_wrist", "right_wrist", "nose"), Undistorter(camera, 240)
     points = [rng.uniform((60, 50), (260, 190), (people, 3, 2)) for people in (1, 2, 0)]

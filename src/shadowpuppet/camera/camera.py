@@ -75,6 +75,11 @@ class Camera:
         self._check(array.shape == (shape or array.shape) and bool(np.isfinite(array).all()), what, array.tolist(), expected)
         return array
 
+    @property
+    def fov(self) -> float:
+        """Horizontal field of view, rad, without lens distortion."""
+        return float(2 * np.arctan(self.size[0] / 2 / self.matrix[0, 0]))
+
     @classmethod
     def from_fov(cls, size: tuple[int, int], fov: float, name: str = "cam", pixel: float = 1.0) -> Camera:
         """A level camera at the world's origin, known only by its horizontal field of view (radians) and the width of its pixels over their

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,3 +43,8 @@ class Keypoints:
     def scaled(self, size: tuple[int, int], to: tuple[int, int]) -> Keypoints:
         """The same in pictures of another size than the film's (width, height)."""
         return replace(self, xy=(self.xy + 0.5) * np.divide(to, size) - 0.5)
+
+
+def cameras_with_persons(keypoints: Iterable[Keypoints | None]) -> int:
+    """Number of cameras in which a detector found a person; `keypoints`: of one moment, one per camera."""
+    return sum(each is not None and len(each.person) > 0 for each in keypoints)

@@ -39,6 +39,8 @@ WITH_PRESETS: dict[str, tuple[Mapping[str, Any], Callable[..., Any]]] = {
 """For each table of settings that has presets: these, and the function that makes the settings."""
 OF_ONE, OF_SEVERAL = ("distance", "facing", "tracker", "initialization"), ("prior", "appearance", "evidence", "multiview", "training")
 """Options that matter with one camera only, and with several only."""
+OF_SILHOUETTES = ("background", "masks", "region", "silhouette")
+"""Options that matter only where silhouettes are evidence."""
 PATHS = ("calibration", "background", "person", "prior")
 """Options that are file names, relative to the folder of the settings file that contains them."""
 
@@ -205,13 +207,11 @@ def check_used(options: Options, several: bool) -> None:
                             "no keypoints")
     given = {name: getattr(options, name) for name in ("preset", "body") if getattr(options, name) is not None}
     usual, now = plain_values(make_options(given)), plain_values(options)
-    idle = [name for key in (OF_ONE if several else OF_SEVERAL) for name in _changed(key, usual[key], now[key])]
-    if idle:
-        warn(f"no effect with {cameras}: {', '.join(idle)}")
-    if not options.uses_silhouettes:
-        unused = [name for name in ("background", "masks", "region", "silhouette") if getattr(options, name) != getattr(Options(), name)]
-        if unused:
-            warn(f"no effect with keypoints alone: {', '.join(unused)}")
+    without = () if options.uses_silhouettes else OF_SILHOUETTES
+    for keys, where in ((OF_ONE if several else OF_SEVERAL, cameras), (without, "keypoints alone")):
+        idle = [name for key in keys for name in _changed(key, usual[key], now[key])]
+        if idle:
+            warn(f"no effect with {where}: {', '.join(idle)}")
     if options.label is not None and not options.masks:
         warn("no effect without ready silhouettes (--masks): label")
 

@@ -16,7 +16,7 @@ from shadowpuppet.body.models import WHOLE, average_sizes, make_body
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.camera.bits import Bits
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.keypoints import Keypoints
+from shadowpuppet.camera.keypoints import Keypoints, cameras_with_persons
 from shadowpuppet.camera.mask import Mask, Seen, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import HARMFUL, NOTED, Finding, SettingsError, choices
@@ -77,7 +77,7 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
     def observe(self, seen: Seen) -> HullObservation:
         """Surface points of the visual hull of the masks, if they are evidence, and what was seen."""
         if self.hull is None:
-            return HullObservation(NO_SURFACE, seen, sum(each is not None and len(each.person) > 0 for each in seen.keypoints))
+            return HullObservation(NO_SURFACE, seen, cameras_with_persons(seen.keypoints))
         people = sum(mask is not None and may_be_person(mask) for mask in seen.masks)
         return HullObservation(self.hull.points(seen.masks), seen, people)
 

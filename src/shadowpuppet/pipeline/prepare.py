@@ -82,10 +82,9 @@ def look_at(recording: str | Path, options: Options | None = None, listener: Lis
     several. Raises a `ShadowPuppetError` if something cannot be used."""
     options = options or Options()
     rig = open_rig(recording, options)
-    keypoints = look_at_keypoints(rig.footage)
     look = (survey_rig(rig, options, listener=listener).look if is_for_rig(rig, options)
             else prepare(generators(options)[0], rig, options, MONOCULAR, listener=listener).look)
-    return replace(look, keypoints=keypoints)
+    return look if look.keypoints is not None else replace(look, keypoints=look_at_keypoints(rig.footage))
 
 
 @one_blas_thread()

@@ -128,7 +128,7 @@ def _field_of_view(placed: Placed, n: int) -> Iterator[str]:
     """A camera's field of view across its picture, and how well it is known; nothing if the lens was given."""
     camera, doubt = placed.cameras[n], placed.focal_doubt[n]
     if doubt:
-        half = np.arctan(camera.size[0] / 2 / camera.matrix[0, 0])
+        half = camera.fov / 2
         yield f"{np.degrees(2 * half):.1f}° ± {np.degrees(np.sin(2 * half) * doubt):.1f}°"
 
 

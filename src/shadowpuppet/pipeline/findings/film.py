@@ -120,7 +120,7 @@ def _judged(footage: Footage, sample: Sample, silhouettes: Silhouettes, runs: li
     camera = footage.camera
     look = FilmLook(
         size=footage.view.camera.size, worked_size=camera.size, background=silhouettes.source,
-        fov=float(np.degrees(2 * np.arctan(camera.size[0] / 2 / camera.matrix[0, 0]))), frames=footage.count, rate=1 / sample.pace,
+        fov=float(np.degrees(camera.fov)), frames=footage.count, rate=1 / sample.pace,
         key="none" if silhouettes.segmenter is None else silhouettes.segmenter.reason, exact_overlap=mean_overlap(masks, exact),
         quality=quality_of(runs, sample.starts, silhouettes.segmenter is None), added=_added(silhouettes, footage),
         condition=condition_of(silhouettes, sample, runs),

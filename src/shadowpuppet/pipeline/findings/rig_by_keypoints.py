@@ -10,7 +10,7 @@ import numpy as np
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.sizes import HEIGHTS
 from shadowpuppet.calibration.agreement import MAX_DISAGREEMENT, Agreement
-from shadowpuppet.camera.keypoints import Keypoints
+from shadowpuppet.camera.keypoints import Keypoints, cameras_with_persons
 from shadowpuppet.errors import RUINOUS, Finding
 from shadowpuppet.geometry import evenly_spread
 from shadowpuppet.pipeline.findings.cautions import film_cautions
@@ -42,7 +42,7 @@ def survey_keypoints(rig: Rig, options: Options, listener: Listener | None = Non
                    agreement=Agreement(names=rig.names, apart=(None,) * len(rig.names), pairs=(), limit=MAX_DISAGREEMENT, height=None),
                    keypoints=found)
     least = min(2, len(rig.footage))
-    seen = [each for each in first.keypoints if sum(one is not None and len(one.person) > 0 for one in each) >= least]
+    seen = [each for each in first.keypoints if cameras_with_persons(each) >= least]
     if not seen:
         where = "in two cameras at the same time" if least > 1 else "in the film"
         refusal = (f"the detector found no person {where} within the first {OPENING:g} s: do films and keypoints "
@@ -75,5 +75,5 @@ def _camera_look(footage: Footage) -> CameraLook:
     camera = footage.camera
     x, y, z = footage.view.camera.centre.tolist()
     return CameraLook(name=camera.name, place=(x, y, z), start=footage.view.start, size=footage.view.camera.size, worked_size=camera.size,
-                      fov=float(np.degrees(2 * np.arctan(camera.size[0] / 2 / camera.matrix[0, 0]))), frames=footage.count,
+                      fov=float(np.degrees(camera.fov)), frames=footage.count,
                       rate=footage.film.rate, background="none, keypoints alone", key="none", exact_overlap=None, quality=mask_quality(()))

@@ -78,7 +78,7 @@ def pose_deviations(skeleton: Skeleton, points: Points, pose: Array, sd: Array, 
 
 
 def limit_deviations(limits: tuple[Array, Array]) -> Array:
-    """Standard deviations (D,) of degrees of freedom of which only the limits, lowest and highest (D,), are known."""
+    """Standard deviations (D,) of degrees of freedom that may be anywhere between their limits, lowest and highest (D,)."""
     low, high = limits
     return np.maximum(np.where(np.isfinite(high - low), (high - low) / np.sqrt(12), UNBOUNDED), STEP)
 

@@ -66,8 +66,9 @@ def person_between(cameras: Sequence[Camera], keypoints: Sequence[Keypoints | No
     pairs = [pair for pair in combinations(seen, 2) if pair[0][0] != pair[1][0]]
     if not pairs:
         return tuple(_largest(each) for each in keypoints), middle
-    first = max(pairs, key=lambda pair: met(*pair)[0])
-    places = met(*first)[1]
+    tried = {pair: met(*pair) for pair in pairs}
+    first = max(tried, key=lambda pair: tried[pair][0])
+    places = tried[first][1]
     if not np.isfinite(places).all(1).any():
         return (None,) * number, middle
     middle = np.nanmean(places, axis=0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from shadowpuppet.body.whole_body import heading_column
 from shadowpuppet.camera.camera import Camera
-from shadowpuppet.camera.keypoints import Keypoints
+from shadowpuppet.camera.keypoints import Keypoints, cameras_with_persons
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.keypoints.candidates import candidates, pose_at, seem_wrong, triangulated_landmarks
@@ -111,7 +111,7 @@ def keypoint_evidence(refiner: Refiner, cameras: Sequence[Camera], settings: Mul
                       masks: Sequence[Mask | None], middle: Array | None, last: Array | None = None) -> KeypointEvidence | None:
     """What a frame's keypoints, one per camera, say of the person: of those in the masks (H, W), or of those nearest to the `last` pose
     (D,). `middle` (3,): about where the person is, world; None if that is not known. None without keypoints."""
-    if not settings.keypoints or not any(each is not None and len(each.person) for each in keypoints):
+    if not settings.keypoints or not cameras_with_persons(keypoints):
         return None
     marks = refiner.landmarks
     if last is not None:
