@@ -123,10 +123,10 @@ Factors = dict[str, dict[int, Array]]
 
 
 def fit_all(runs: Sequence[Errors]) -> Factors:
-    """Factors of all groups that occur; the world's two level axes (several cameras) share theirs."""
-    alone = "distance" in runs[0].names
-    least = np.array([(LEAST if alone else LEAST_SEVERAL).get(name, 0.0) for name in runs[0].names])
-    axes, out = [(0,), (1,), (2,)] if alone else [(0, 1), (2,)], dict[str, dict[int, Array]]()
+    """Factors of all groups that occur; the world's two level axes share theirs, those of the silhouettes' only camera do not."""
+    along_view = "spread_depth" in runs[0].names
+    least = np.array([(LEAST if "distance" in runs[0].names else LEAST_SEVERAL).get(name, 0.0) for name in runs[0].names])
+    axes, out = [(0,), (1,), (2,)] if along_view else [(0, 1), (2,)], dict[str, dict[int, Array]]()
     for group, tied in product(GROUPS, axes):
         own = [run for run in runs if group_of(run.joint) == group and run.axis in tied]
         if own:

@@ -9,9 +9,11 @@ from itertools import combinations, islice
 from pathlib import Path
 
 import numpy as np
+import postures
 from cases import Case
 from keypoints import with_keypoints
 from numpy.typing import NDArray
+from postures import HERE as POSTURES
 from proving_ground import HERE as GROUND
 from proving_ground import made as made_ground
 from spoiled import SPOILS
@@ -212,7 +214,7 @@ def track_multiview(path: Path, kind: str = "multiview") -> Iterator[Tracked]:
     for detector, cameras in SIGHTINGS.get(kind, ()):
         known = with_keypoints(path, detector)
         options = {"evidence": "silhouettes,keypoints" if kind == "both" else "keypoints"}
-        options |= {"camera": ",".join(across(known)[:cameras])} if cameras else {}
+        options |= {"camera": ",".join(across(known)[:cameras])} if cameras and path.parent != POSTURES else {}
         faults = {name: FAULTS[name] for name in ("clean", *(BESIDE if kind == "both" and detector == "mediapipe" else ()))}
         for run in tracked_with(known, make_options(options), faults):
             is_clean = detector == "mediapipe" and cameras < 2 and run.fault == "clean"
@@ -284,6 +286,8 @@ def collect(kind: str, path: Path, build: Path, again: bool, clean: bool = False
     folder = build / kind / path.name
     if path.parent == RINGS:
         make_ring(path)
+    elif path.parent == POSTURES:
+        postures.made(next(film for film in _whole() if film.spec.name == path.name), POSTURES)
     if again or not (folder / "done").exists():
         folder.mkdir(parents=True, exist_ok=True)
         for run in islice(TRACK[kind](path), 1 if clean else None):
@@ -299,8 +303,14 @@ def _rings() -> list[Path]:
     return [RINGS / spec.name for spec in proving_rings()]
 
 
+def _whole() -> list[postures.Film]:
+    """Films of one camera that show a whole person, who stands, sits, squats or kneels."""
+    return [film for film in postures.films() if film.body is not None]
+
+
 TRACK = {"monocular": track_monocular, "multiview": track_multiview, **{kind: partial(track_multiview, kind=kind) for kind in SIGHTINGS}}
-MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND), **dict.fromkeys(("multiview", *SIGHTINGS), _rings)}
+MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND), **dict.fromkeys(("multiview", *SIGHTINGS), _rings),
+                                             "keypoints_one": lambda: [*_rings(), *(POSTURES / film.spec.name for film in _whole())]}
 
 
 def read_runs(files: Iterable[Path]) -> list[Tracked]:

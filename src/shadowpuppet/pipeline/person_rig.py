@@ -36,9 +36,17 @@ from shadowpuppet.tracking.doubt.multiview import Before, MultiviewDoubt
 from shadowpuppet.tracking.doubt.steps import Trail
 from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.keypoints.stature import height_by_bones
+from shadowpuppet.tracking.multiview.bundle_adjustment import Deviations
 from shadowpuppet.tracking.multiview.height_estimation import FirstFrame, SeenHeight, estimate_height
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings, for_rate, for_smeared
-from shadowpuppet.tracking.multiview.size_estimation import Front, dressed, estimate_sizes, shared_deviations, size_deviations
+from shadowpuppet.tracking.multiview.size_estimation import (
+    Front,
+    dressed,
+    estimate_sizes,
+    known_stature,
+    shared_deviations,
+    size_deviations,
+)
 from shadowpuppet.tracking.multiview.surface.visual_hull import NO_SURFACE, SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles
@@ -160,26 +168,26 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
     known = familiar(rng, options, training, settings.body, rate)
     first = [FirstFrame(NO_SURFACE if hull is None else hull.points(masks), masks, keypoints[n] if keypoints else ())
              for n, masks in enumerate(views)]
-    height, seen, shared, begin = options.height or height, None, None, 0
+    height, seen, begin = options.height or height, None, 0
     shown = "hulls" if options.uses_silhouettes else "keypoints"
     if options.person is not None:
         sizes, source = read_person(options.person, settings.body).sizes, str(options.person)
-        spread = np.zeros(len(sizes.names()))
+        spread = Deviations(np.zeros(len(sizes.names())))
     elif known.sizes is not None:
         sizes, source = known.sizes, f"training motion, and the {shown} of the first seconds"
-        spread = size_deviations(known.sizes, shown=True)
+        spread = Deviations(size_deviations(known.sizes, shown=True))
     else:
         seen = _seen_height(rng, cameras, first, settings) if height is None else None
         tall, begin = (height or AVERAGE_HEIGHT, 0) if seen is None else seen
         sizes = dressed(average_sizes(settings.body, tall))
         source = f"{'the height' if height else f'a height of {tall:.2f} m as seen'}, and the {shown} of the first seconds"
         assert isinstance(sizes, BoneSizes)
-        spread, shared = size_deviations(sizes, shown=False), None if height else shared_deviations(sizes)
-        if len(cameras) == 1:  # which shows no length
-            spread, shared = np.zeros(len(sizes.names())), None
+        spread = Deviations(size_deviations(sizes, shown=False), None if height else shared_deviations(sizes))
+        if len(cameras) == 1:  # which shows proportions only
+            spread = Deviations(spread.alone, sums=known_stature(sizes))
     library, looks = known.poses if len(known.poses) else None, 0 if hull is None else looks_in(settings.patience, rate)
     person = estimate_sizes(rng, partial(make_body, settings.body), sizes, spread, cameras, first, settings, library,
-                            len(first) // 2 if looks else 0, shared, begin, both_fronts)
+                            len(first) // 2 if looks else 0, begin, both_fronts)
     prior = known.prior if settings.method == "hybrid" else None
     fit = {"overlap": round(person.overlap, 3), "residual": person.residual} if options.uses_silhouettes else {}
     summary = {"source": source, **fit, "frames": person.frames,

@@ -19,7 +19,7 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.keypoints.sights import Sights, sights_of
 from shadowpuppet.tracking.multiview import bundle_adjustment
-from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
+from shadowpuppet.tracking.multiview.bundle_adjustment import Deviations, solve_bundle
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, make_cloud
 from shadowpuppet.tracking.multiview.refinement.free_space import free_space
 from shadowpuppet.tracking.multiview.settings import SurfaceSettings
@@ -247,7 +247,7 @@ def test_whoever_is_taller_than_expected_is_taller_all_over():
     rng = np.random.default_rng(3)
     clouds = [actor.cloud_of(actor.surface(tall, pose, rng, 30, 0.003)) for pose in poses]
     alone = solve_bundle(anatomical, MEAN, close, poses, clouds, worth=1.0)
-    together = solve_bundle(anatomical, MEAN, close, poses, clouds, worth=1.0, shared=0.06 * MEAN.to_array()[None])
+    together = solve_bundle(anatomical, MEAN, Deviations(close, 0.06 * MEAN.to_array()[None]), poses, clouds, worth=1.0)
     grown = [np.array([getattr(found.sizes, name) / getattr(MEAN, name) for name in ("thigh_length", "shank_length", "lumbar_height")])
              for found in (alone, together)]
     assert grown[1].min() > 1.05

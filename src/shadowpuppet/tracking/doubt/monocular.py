@@ -18,7 +18,7 @@ from shadowpuppet.motion.limbs import LIMBS, joints_of_limbs, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import levers_of, limb_of_part
 from shadowpuppet.tracking.doubt.mirror import Mirrors
-from shadowpuppet.tracking.doubt.steps import CONSTANT, stillness
+from shadowpuppet.tracking.doubt.steps import CONSTANT, DISTANCE, stillness
 from shadowpuppet.tracking.frozen import is_frozen, same_silhouette
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 
@@ -28,8 +28,6 @@ TEMPERATURE = 100.0
 """A particle's weight falls to 1/e for this much more cost (pixels at 320 x 240): neighbouring pixels err together."""
 THIN = 0.03
 """Half width of what an inaccurate outline may leave over, as a share of the root of the person's area."""
-DISTANCE = 0.02
-"""Standard deviation of the person's distance, over it: who is measured does not stand exactly where it was measured."""
 REACH = 1.1
 """Radius about a limb's root, over the limb's length, in which unexplained silhouette may be this limb's."""
 TRUNK_REACH = 1.0

@@ -20,7 +20,7 @@ from shadowpuppet.motion.limbs import LIMBS, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.keypoints import keypoint_view
 from shadowpuppet.tracking.doubt.limbs import levers_of, limb_of_part
-from shadowpuppet.tracking.doubt.steps import CONSTANT, Trail, stillness, surprise
+from shadowpuppet.tracking.doubt.steps import CONSTANT, DISTANCE, Trail, stillness, surprise
 from shadowpuppet.tracking.frozen import same_silhouette
 from shadowpuppet.tracking.multiview.keypoint_evidence import KeypointEvidence
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
@@ -78,7 +78,8 @@ class MultiviewDoubt:
         outside a silhouette, the share without surface points, and the share that few cameras see, times the joint's lever, and the
         distance of the surface that its parts explain; how far the joint left its course; the misfit of the whole body; silhouettes that do
         not change; and the distance to its counterpart on the other side, if they were close within the last second. Where keypoints show
-        a limb, what silhouettes do not show of it counts less; and there are the components of `keypoint_view`.
+        a limb, what silhouettes do not show of it counts less; and there are the components of `keypoint_view`, and the error of the
+        person's distance from an only camera.
         """
         body, levers = self.tracker.body, levers_of(self.names)
         points = body.points(state.pose[None])[0]
@@ -92,6 +93,8 @@ class MultiviewDoubt:
         if keypoints is not None:
             shown = keypoint_view(body, state.pose, keypoints)
             found, unseen = found | shown.components, 1 - shown.known
+            if len(self.tracker.cameras) == 1:
+                found |= {"distance": DISTANCE * np.abs(points - self.tracker.cameras[0].centre)}
         if keypoints is None or any(mask is not None for mask in masks):
             shares = self._limb_shares(state.pose, surface, masks)
             shares[:, :4] *= unseen[:, None]

@@ -1,4 +1,4 @@
-"""Change from frame to frame: joints that leave their course, pictures that do not change."""
+"""Components of doubt that one and several cameras share: constants, joints that leave their course, pictures that do not change."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from shadowpuppet.geometry import Array
 
 CONSTANT = 0.015
 """The constant component of doubt, metres: bodies differ in where their joints are."""
+DISTANCE = 0.02
+"""Standard deviation of a person's distance from an only camera, over it: bodies differ in their proportions."""
 PACE = 1 / 15
 """Time (s) over which motion is compared, at any frame rate: neighbouring frames of a fast film differ by jitter."""
 KEPT = 2.6 * PACE

@@ -44,6 +44,33 @@ MAX_SIZE_STEP, MAX_POSE_STEP = 0.03, 0.3
 """Largest step of a size (m) and of a DOF (rad or m) in a round."""
 
 
+class Deviations(NamedTuple):
+    """How people's sizes deviate from those expected: independent normal distributions, common causes, and what is known of sums."""
+
+    alone: Array
+    """Standard deviations (m) of each, (K,), or (2, K) of those that are smaller and larger than expected; 0 for fixed sizes."""
+    together: Array | None = None
+    """Deviations (S, K), m, each row for one standard deviation of a common cause, such as the stature."""
+    sums: Array | None = None
+    """Rows (R, K), 1/m: a sum of the sizes, weighted by them, is within one of that of the expected sizes, as is a known height."""
+
+    @classmethod
+    def of(cls, spread: Array | Deviations) -> Deviations:
+        """Deviations, or independent ones of some standard deviations."""
+        return spread if isinstance(spread, Deviations) else cls(spread)
+
+    def precision(self, side: int) -> Array:
+        """Inverse covariance (K, K) of sizes that are smaller (`side` 0), or larger (1), than expected; 0 for fixed ones but in sums."""
+        spread = np.broadcast_to(self.alone, (2, np.shape(self.alone)[-1]))[side]
+        alone = np.zeros(len(spread))
+        alone[spread > 0] = 1 / spread[spread > 0] ** 2
+        found = np.diag(alone) if self.sums is None else np.diag(alone) + self.sums.T @ self.sums
+        if self.together is None or not len(self.together):
+            return found
+        weighed = self.together * alone  # Woodbury's identity
+        return found - weighed.T @ np.linalg.solve(np.eye(len(self.together)) + weighed @ self.together.T, weighed)
+
+
 @dataclass(frozen=True, eq=False)
 class Bundle(Generic[Measured]):
     """Sizes and poses that fit the surface points best."""
@@ -55,23 +82,21 @@ class Bundle(Generic[Measured]):
     """Weighted root mean square distance of the points to the tangent planes, metres."""
 
 
-def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array, poses: Array, clouds: Sequence[Cloud],
+def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: Array | Deviations, poses: Array, clouds: Sequence[Cloud],
                  settings: SurfaceSettings | None = None, rounds: int = ROUNDS, pull: float | Array = 1e-6, centre: Array | None = None,
-                 first: Measured | None = None, worth: float = INDEPENDENT_POINTS, shared: Array | None = None,
+                 first: Measured | None = None, worth: float = INDEPENDENT_POINTS,
                  spaces: Sequence[FreeSpace] = (), emptiness: float = 0.0, rays: Sequence[tuple[Sights, float]] = ()) -> Bundle[Measured]:
     """Sizes and poses that fit the surface points of F frames, by damped Gauss-Newton from poses (F, D) and sizes `first` or `expected`.
 
-    `spread`: standard deviations (m) of the expected sizes, (K,), or (2, K) for sizes that are smaller and larger than expected; 0 for
-    fixed ones. `shared` (S, K): deviations that sizes have together, each row for one standard deviation of a common cause, such as the
-    stature. `spaces`, one per frame, and `emptiness`: silhouettes that limbs must not reach out of, as in `Pass`. `pull`, one or (F, D):
-    weight of the squared distance from `centre` (F, D; default: `poses`), as in `Refiner.gauss_newton`. `worth`: effective number of
-    independent points per frame. `rays`, one per frame: to the person's landmarks, and what a nat of their surprise costs, m^2.
+    `spread`: deviations from the expected sizes, or `Deviations.alone`. `spaces`, one per frame, and `emptiness`: silhouettes that limbs
+    must not reach out of, as in `Pass`. `pull`, one or (F, D): weight of the squared distance from `centre` (F, D; default: `poses`), as in
+    `Refiner.gauss_newton`. `worth`: effective number of independent points per frame. `rays`, one per frame: to the person's landmarks, and
+    what a nat of their surprise costs, m^2.
     """
     settings, start, about = settings or SurfaceSettings(), poses if centre is None else centre, expected.to_array()
-    pull = np.broadcast_to(pull, poses.shape)
-    spread = np.broadcast_to(spread, (2, len(about)))
-    free, scale = np.flatnonzero(spread[0] > 0), worth / POINT_NOISE**2
-    smaller, larger = (_precision(each, shared)[np.ix_(free, free)] for each in spread)
+    pull, prior = np.broadcast_to(pull, poses.shape), Deviations.of(spread)
+    free, scale = np.flatnonzero(np.atleast_2d(prior.alone)[0] > 0), worth / POINT_NOISE**2
+    smaller, larger = (prior.precision(side)[np.ix_(free, free)] for side in range(2))
     at, damping, best = ((about if first is None else first.to_array()), poses), 1e-2, None
     for turn in range(rounds + 1):
         body = make(type(expected).from_array(at[0]))
@@ -93,16 +118,6 @@ def solve_bundle(make: Callable[[Measured], Body], expected: Measured, spread: A
     assert best is not None
     residual = np.sqrt(np.mean([frame.squared for frame in best.frames]))
     return Bundle(type(expected).from_array(best.at[0]), best.at[1], float(residual))
-
-
-def _precision(spread: Array, shared: Array | None) -> Array:
-    """Inverse covariance (K, K) of sizes that deviate by `spread` (K,) each and by `shared` (S, K) together; 0 for fixed sizes."""
-    alone = np.zeros(len(spread))
-    alone[spread > 0] = 1 / spread[spread > 0] ** 2
-    if shared is None or not len(shared):
-        return np.diag(alone)
-    weighed = shared * alone  # Woodbury's identity
-    return np.diag(alone) - weighed.T @ np.linalg.solve(np.eye(len(shared)) + weighed @ shared.T, weighed)
 
 
 class _Model(NamedTuple):

@@ -22,7 +22,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.tracking.keypoints.sights import NO_SIGHTS
-from shadowpuppet.tracking.multiview.bundle_adjustment import Measured, solve_bundle
+from shadowpuppet.tracking.multiview.bundle_adjustment import POINT_NOISE, Deviations, Measured, solve_bundle
 from shadowpuppet.tracking.multiview.height_estimation import FRAMES, First, FirstFrame, first_frames
 from shadowpuppet.tracking.multiview.keypoint_evidence import opening_heading
 from shadowpuppet.tracking.multiview.observation import MultiviewObservation, middle_of
@@ -126,6 +126,18 @@ def shared_deviations(sizes: BoneSizes) -> Array:
     return np.array([STATURE_DEVIATION / stature_of(dict(zip(sizes.names(), values))) * values, girth])
 
 
+UPRIGHT = ("ankle_height", "shank_length", "thigh_length", "hip_drop", "trunk_height", "lumbar_height", "thorax_height", "neck_length",
+           "head_height")  # fmt: skip
+"""Sizes one above the other in a person who stands: their sum is the stature."""
+STATURE_KNOWN = 0.01
+"""Standard deviation (m) of a known height: of shoes and of posture."""
+
+
+def known_stature(sizes: BoneSizes) -> Array:
+    """The sum (1, K) of sizes that a known height tells, for `Deviations.sums`."""
+    return np.isin(sizes.names(), UPRIGHT)[None] / STATURE_KNOWN
+
+
 def dressed(sizes: Measured) -> Measured:
     """The sizes of a person in clothes: widths and depths larger by `CLOTHES`."""
     return widened(sizes, CLOTHES)
@@ -141,20 +153,21 @@ def _is_width(kind: type[Sizes]) -> NDArray[np.bool_]:
     return np.array([name.endswith(("_width", "_depth", "_thickness")) for name in kind.names()])
 
 
-def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], expected: Measured, spread: Array, cameras: Sequence[Camera],
-            first: First, settings: MultiviewSettings,
-            library: Array | None = None, looks: int = 0, shared: Array | None = None, begin: int = 0,
-            both_fronts: bool = True) -> SizeEstimate[Measured]:
-    """Sizes of the person in the `first` frames, `expected` with standard deviations `spread`
-    and `shared` as in `solve_bundle`. `looks`: number of frames after which what the body does not explain is left out; 0: never. `begin`:
-    frame in which the person is searched for. Raises `TrackingError` if no person is found.
+def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], expected: Measured, spread: Array | Deviations,
+                   cameras: Sequence[Camera], first: First, settings: MultiviewSettings, library: Array | None = None, looks: int = 0,
+                   begin: int = 0, both_fronts: bool = True) -> SizeEstimate[Measured]:
+    """Sizes of the person in the `first` frames, `expected` with deviations `spread` as in `solve_bundle`. `looks`: number of frames after
+    which what the body does not explain is left out; 0: never. `begin`: frame in which the person is searched for. Raises `TrackingError`
+    if no person is found.
 
     Silhouettes of a person who stands upright hardly distinguish front and back. With `both_fronts`, where a body that faces the other way
     fits nearly as well, the person is measured facing that way, too, and what fits better is kept; not with cylinders, which have no
     front. A front of which the frames' keypoints are certain is the front.
     """
     first = first_frames(first)
-    plain = replace(settings, method="hybrid", refinement="gauss_newton")
+    plain, prior = replace(settings, method="hybrid", refinement="gauss_newton"), Deviations.of(spread)
+    silhouettes = any(mask is not None for each in first for mask in each.masks)
+    worth = INDEPENDENT_POINTS[settings.body] if silhouettes else POINT_NOISE**2 / settings.keypoints  # a nat counts as one
 
     def followed(rng: np.random.Generator, sizes: Measured, facing: float | None) -> tuple[MultiviewTracker, list[Found]]:
         tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
@@ -163,7 +176,7 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
     def measured(rng: np.random.Generator,
                  facing: float | None = None) -> tuple[SizeEstimate[Measured], MultiviewTracker, list[Found]] | None:
         sizes, residual = expected, np.nan
-        for _ in range(ROUNDS if (spread > 0).any() else 0):
+        for _ in range(ROUNDS if (np.asarray(prior.alone) > 0).any() else 0):
             tracker, found = followed(rng, sizes, facing)
             if len(found) < MIN_FRAMES:
                 break
@@ -175,9 +188,8 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
             clouds = [each.cloud(POINT_STRIDE) for each in seen]
             pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
             centre, pull = map(np.array, zip(*pulls, strict=True))
-            bundle = solve_bundle(make, expected, spread, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
-                                  worth=INDEPENDENT_POINTS[settings.body], shared=shared,
-                                  spaces=() if shared is None else [each.space for each in seen],
+            bundle = solve_bundle(make, expected, prior, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
+                                  worth=worth, spaces=() if prior.together is None else [each.space for each in seen],
                                   emptiness=EMPTINESS_SHARE * settings.gauss_newton.emptiness,
                                   rays=[(NO_SIGHTS, 0.0) if each is None else each.rays for each in shown])
             sizes, residual = bundle.sizes, bundle.residual
