@@ -15,6 +15,7 @@ from shadowpuppet.cli.tables import error_table, files_in, metrics_table, people
 from shadowpuppet.cli.terminal import Terminal
 from shadowpuppet.errors import typed
 from shadowpuppet.pipeline.findings.keypoints import FilmKeypointsLook, KeypointsLook
+from shadowpuppet.pipeline.findings.verdict import Verdict
 
 QUALITY = SimpleNamespace(frames=12, area=0.0512, area_change=0.0123, flicker=0.0045, specks=0.25, holes=1.5,
                           border={"left": 0.021, "right": 0.02, "bottom": 0.5})  # fmt: skip
@@ -126,13 +127,15 @@ def test_people(printed):
 
 def test_verdicts(printed):
     def verdict(word, *reasons):
-        return printed(verdict_table(SimpleNamespace(word=word, reasons=reasons), "verdict"))
+        return printed(verdict_table(Verdict(word, reasons), "verdict"))
 
     assert verdict("good", "it is dark", "it is far") == ["verdict good", "but it is dark", "it is far"]
     assert verdict("bad", "it is dark") == ["verdict bad", "because it is dark"]
     assert verdict("good") == ["verdict good"]
-    assert printed(verdict_table(SimpleNamespace(word="bad", reasons=("dark",)), "on the run")) == ["on the run bad", "because dark"]
+    assert printed(verdict_table(Verdict("bad", ("dark",)), "on the run")) == ["on the run bad", "because dark"]
     assert printed(verdict_of({"word": "bad", "reasons": ["dark"], "more": 1}, "person 1")) == ["person 1 bad", "because dark"]
+    both = ["verdict good in the picture, bad in depth", "because one camera"]
+    assert printed(verdict_table(Verdict("good", ("one camera",), "bad"), "verdict")) == both
 
 
 def test_files_that_are_there_are_named(tmp_path):

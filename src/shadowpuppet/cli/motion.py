@@ -90,6 +90,7 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
     from shadowpuppet.io.export import export_run
     from shadowpuppet.io.people import person_folders
     from shadowpuppet.io.run import read_run, resuming
+    from shadowpuppet.pipeline.findings.verdict import Verdict
 
     formats = list(EXPORTS) if to == "all" else [name.strip().lower() for name in to.split(",")]
     with terminal(quiet) as listener:
@@ -108,9 +109,10 @@ def export(run: Annotated[Path, Parameter(help="Folder that `track` or `live` ma
                 listener.warn(f"the run{of} was broken off: {len(each.motion)} frames of it are exported, as tracked, not smoothed; "
                               f"{resuming(each)}")
             verdict = each.metrics.get("verdict", {})
-            if verdict.get("word") == "bad":
+            if "bad" in (verdict.get("word"), verdict.get("depth")):
                 why = "; ".join(verdict["reasons"])
-                listener.warn(f"the verdict on this run{of} is bad ({why}): look at its overlay before you use the motion")
+                listener.warn(f"the verdict on this run{of} is {Verdict.of(verdict).words} ({why}): look at its overlay before you use the "
+                              "motion")
     if not quiet:
         level, whole = one.floor, one.motion.body_name in WHOLE
         side = "below" if level < 0 else "above"

@@ -109,16 +109,16 @@ def seen_height(height: float | None) -> str | None:
 
 
 def verdict_table(verdict: Verdict, title: str) -> RenderableType:
-    """One word, and the reasons below it."""
-    joined = "but" if verdict.word == "good" else "because"
-    return pairs([(title, verdict.word), *(("" if n else joined, reason) for n, reason in enumerate(verdict.reasons))])
+    """The verdict in a word, or two with depth, and the reasons below it."""
+    joined = "but" if verdict.words == "good" else "because"
+    return pairs([(title, verdict.words), *(("" if n else joined, reason) for n, reason in enumerate(verdict.reasons))])
 
 
 def verdict_of(plain: Mapping[str, Any], title: str) -> RenderableType:
     """The table of a verdict as a run's metrics keep it."""
     from shadowpuppet.pipeline.findings.verdict import Verdict
 
-    return verdict_table(Verdict(plain["word"], tuple(plain["reasons"])), title)
+    return verdict_table(Verdict.of(plain), title)
 
 
 def files_in(folder: Path, *names: str) -> tuple[str, list[str]]:

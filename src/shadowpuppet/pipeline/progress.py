@@ -287,7 +287,8 @@ def judge(writer: RunWriter, rig: Rig, look: Look | RigLook, person: Person, opt
     writer.info |= floor_entry(writer.motion, rig.cameras, person)
     writer.check()
     found, frames = evaluated(rig, writer.motion), (len(writer.motion), tracked(look.frames, options.every))
-    verdict = verdict_of_run(look, writer.motion, writer.metrics.get("set_aside", ()), frames)
+    verdict = verdict_of_run(look, writer.motion, writer.metrics.get("set_aside", ()), frames,
+                             camera=None if rig.is_multiview else rig.cameras[0])
     writer.metrics |= found | {"verdict": verdict.plain()}
     return found
 

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from shadowpuppet.calibration.agreement import Agreement
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Finding
 from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
 from shadowpuppet.pipeline.findings.look import Look, RigLook
 from shadowpuppet.pipeline.findings.verdict import (
+    Verdict,
     _together,
     blind_frames,
     expected_error,
@@ -33,6 +35,9 @@ QUALITY = MaskQuality(frames=40, area=0.1, area_change=0.0, area_jumps=0.0, flic
 LOOK = Look(recording="film", camera="cam", size=(320, 240), worked_size=(320, 240), fov=60.0, calibrated=True, frames=100, looked_at=100,
             rate=25.0, jitter=0.0, scale="height 1.80 m", background="film", key="both", area=0.1, plain_area=None, exact_overlap=None,
             exact_overlap_plain=None, quality=QUALITY)
+
+CAMERA = Camera.from_fov((320, 240), 1.0)
+"""At the origin, with depth along y."""
 
 
 def caution(weight: int, name: str = "x") -> Finding:
@@ -76,7 +81,7 @@ def test_findings_are_saved_with_their_evidence():
 
 
 def test_a_recording_that_cannot_be_tracked_is_bad():
-    assert verdict_of_look(replace(LOOK, refusal="nobody is in it")) == ("bad", ("nobody is in it",))
+    assert verdict_of_look(replace(LOOK, refusal="nobody is in it")) == ("bad", ("nobody is in it",), None)
     assert verdict_of_look(LOOK).word == "good"
 
 
@@ -136,6 +141,29 @@ def test_runs_are_judged_by_what_they_state(run, word, reason):
     assert verdict.reasons[:1] == (() if reason is None else (reason,))
 
 
+@pytest.mark.parametrize(("sd", "words", "reasons"), [
+    ((0.03, 0.03, 0.03), "good", ()),
+    ((0.03, 0.3, 0.03), "good in the picture, bad in depth", ("depths may be off by 239 mm: add a camera aside",)),
+    ((0.03, 0.14, 0.03), "good in the picture, doubtful in depth", ("depths may be off by 112 mm: add a camera aside",)),
+    ((0.3, 0.03, 0.03), "bad", ("joints may be off by 267 mm on average",)),
+    ((0.3, 0.3, 0.3), "bad", ("joints may be off by 376 mm on average", "depths may be off by 239 mm: add a camera aside"))])
+def test_one_camera_is_judged_in_the_picture_and_in_depth(sd, words, reasons):
+    run = motion(0.0)
+    run = replace(run, joint_sd=np.broadcast_to(sd, run.joint_sd.shape), joints=run.joints + np.array([0, 4, 0]))
+    found = verdict_of_run(LOOK, run, camera=CAMERA)
+    assert (found.words, found.reasons) == (words, reasons)
+    assert Verdict.of(json.loads(json.dumps(found.plain()))) == found
+
+
+@pytest.mark.parametrize(("sd", "words"), [((0.02, 0.06, 0.02), "good in the picture, doubtful in depth"),
+                                           ((0.06, 0.02, 0.06), "doubtful")])
+def test_a_limb_is_doubtful_where_it_may_be_farther_off(sd, words):
+    run = motion(0.0, doubtful=8)
+    run = replace(run, joint_sd=np.broadcast_to(sd, run.joint_sd.shape), joints=run.joints + np.array([0, 4, 0]))
+    found = verdict_of_run(LOOK, run, camera=CAMERA)
+    assert (found.words, found.reasons) == (words, ("left arm doubtful in 80 % of frames",))
+
+
 @pytest.mark.parametrize(("arm", "word"), [(0.03, "good"), (0.05, "doubtful")])
 def test_with_several_cameras_an_arm_that_is_often_doubtful_counts_where_it_may_be_far_off(arm, word):
     """The arm is expected to be off by 48 or 80 mm, the whole body by under 50."""
@@ -144,7 +172,7 @@ def test_with_several_cameras_an_arm_that_is_often_doubtful_counts_where_it_may_
     deviations[:, 1:4] = arm
     rig = RigLook(recording="lab", cameras=(None,) * 4, rate=25.0, frames=10, agreement=None)
     found = verdict_of_run(rig, replace(run, joint_sd=deviations))
-    assert found == (word, ("left arm doubtful in 80 % of frames",))
+    assert found[:2] == (word, ("left arm doubtful in 80 % of frames",))
     assert verdict_of_run(LOOK, run).word == "doubtful"
 
 
@@ -157,7 +185,7 @@ def test_frames_without_a_person_are_not_lost():
 def test_a_camera_that_was_set_aside_is_a_reason_once_and_by_name(frames, word):
     run = motion(0.03, statuses="t" * 30)
     aside = [{"camera": "b", "why": "late", "frames": many, "from_s": 2.25 + n, "to_s": 2.25 + n} for n, many in enumerate(frames)]
-    assert verdict_of_run(LOOK, run, aside) == (word, ("camera 'b' late from 2.2 s: check its start",))
+    assert verdict_of_run(LOOK, run, aside)[:2] == (word, ("camera 'b' late from 2.2 s: check its start",))
 
 
 def test_frames_in_which_every_camera_was_blind_are_no_error_of_the_joints():
@@ -166,7 +194,7 @@ def test_frames_in_which_every_camera_was_blind_are_no_error_of_the_joints():
     black = [{"camera": "cam", "why": "blind", "frames": 1, "from_s": 9.0, "to_s": 9.0}]
     assert (expected_error(run), expected_error(run, blind_frames(run, black, 1))) == pytest.approx((0.136, 0.096), abs=1e-3)
     assert verdict_of_run(LOOK, run).word == "bad"
-    assert verdict_of_run(LOOK, run, black) == ("doubtful", ("person lost in 10 % of frames: look at overlay.mp4 (--overlay)",
+    assert verdict_of_run(LOOK, run, black)[:2] == ("doubtful", ("person lost in 10 % of frames: look at overlay.mp4 (--overlay)",
                                                              "camera 'cam' blind from 9.0 s: look at its film"))
     assert not blind_frames(run, black, 2).any()
     assert not blind_frames(run, [black[0] | {"why": "frozen"}], 1).any()
@@ -182,7 +210,7 @@ def test_a_run_with_far_fewer_frames_than_the_film_states_is_not_good(frames, wo
 
 def test_what_the_look_found_is_among_the_reasons():
     verdict = verdict_of_run(replace(LOOK, findings=(caution(HARMFUL, "film is noisy: use more light"),)), motion(0.03, doubtful=2))
-    assert verdict == ("doubtful", ("film is noisy: use more light", "left arm doubtful in 20 % of frames"))
+    assert verdict[:2] == ("doubtful", ("film is noisy: use more light", "left arm doubtful in 20 % of frames"))
 
 
 def test_arms_and_legs_take_one_reason_each():

@@ -8,6 +8,7 @@ from shadowpuppet.evaluation.evaluation import Evaluation
 from shadowpuppet.evaluation.report.html import definitions, plain, rows, table
 from shadowpuppet.evaluation.summary_text import WAYS, bones_text, clock_text, doubt_text, feet_text, losses_text, root_text, world_text
 from shadowpuppet.motion.metrics import FAR_ERROR, LOST_ERROR
+from shadowpuppet.pipeline.findings.verdict import Verdict
 
 
 def cards(of: Evaluation) -> str:
@@ -20,7 +21,8 @@ def cards(of: Evaluation) -> str:
 def _cards(of: Evaluation) -> Iterator[tuple[str, str, str, str]]:
     measured = of.measured
     if (verdict := of.run.metrics.get("verdict")) is not None:
-        yield "The run's own verdict", plain(verdict["word"]), "", plain("; ".join(verdict["reasons"]) or "nothing speaks against it")
+        reasons = "; ".join(verdict["reasons"]) or "nothing speaks against it"
+        yield "The run's own verdict", plain(Verdict.of(verdict).words), "", plain(reasons)
     if of.errors is not None:
         errors, aligned, moves = (measured[key] for key in ("errors", "aligned_mm", "acceleration"))
         yield "Joint error", f"{errors['mean_mm']:.1f}", "mm", f"mean of {len(errors['joints'])} joints; rmse {errors['rmse_mm']:.1f}"

@@ -1,18 +1,21 @@
 """One word on a recording or a run (good, doubtful, bad) and at most three reasons, the weightiest first.
 
-A run is judged by what it states of itself: frames lost, width of the intervals, doubtful limbs.
+A run is judged by what it states of itself: frames lost, width of the intervals, doubtful limbs. One camera hardly shows depth: a run that
+is right in the picture may be doubtful or bad in depth, which is a word of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
-from typing import Literal, NamedTuple, TypedDict
+from typing import Any, Literal, NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Finding
+from shadowpuppet.geometry import Array, unit
 from shadowpuppet.motion.limbs import DOUBTFUL, joints_of_limbs, limbs_in_words
 from shadowpuppet.motion.metrics import LOST_ERROR
 from shadowpuppet.motion.motion import Motion
@@ -54,10 +57,23 @@ class Verdict(NamedTuple):
     word: Word
     reasons: tuple[str, ...]
     """At most three, the weightiest first, each with what to do in at most ten words."""
+    depth: Word | None = None
+    """The word on depth, if it is worse than that on the rest."""
+
+    @property
+    def words(self) -> str:
+        """The verdict in words."""
+        return self.word if self.depth is None else f"{self.word} in the picture, {self.depth} in depth"
 
     def plain(self) -> dict[str, str | list[str]]:
         """The verdict for JSON."""
-        return {"word": self.word, "reasons": list(self.reasons)}
+        depth = {} if self.depth is None else {"depth": self.depth}
+        return {"word": self.word, **depth, "reasons": list(self.reasons)}
+
+    @classmethod
+    def of(cls, plain: Mapping[str, Any]) -> Verdict:
+        """The verdict that a run's metrics keep."""
+        return cls(plain["word"], tuple(plain["reasons"]), plain.get("depth"))
 
 
 def ranked(findings: Iterable[Finding]) -> list[Finding]:
@@ -65,12 +81,16 @@ def ranked(findings: Iterable[Finding]) -> list[Finding]:
     return sorted(findings, key=lambda each: -each.severity)
 
 
-def verdict_of(findings: Iterable[Finding]) -> Verdict:
-    """The verdict that findings lead to: bad with a ruinous one, doubtful with a harmful one, else good."""
-    ordered = ranked(findings)
-    gravest = ordered[0].severity if ordered else 0
-    word: Word = "bad" if gravest >= RUINOUS else "doubtful" if gravest >= HARMFUL else "good"
-    return Verdict(word, tuple(dict.fromkeys(each.short for each in ordered))[:MOST])
+def verdict_of(findings: Iterable[Finding], in_depth: Sequence[Finding] = ()) -> Verdict:
+    """The verdict that findings lead to: bad with a ruinous one, doubtful with a harmful one, else good; and those about depth alone."""
+    findings = list(findings)
+    word, depth = (_word(max((each.severity for each in some), default=0)) for some in (findings, [*findings, *in_depth]))
+    reasons = tuple(dict.fromkeys(each.short for each in ranked([*findings, *in_depth])))[:MOST]
+    return Verdict(word, reasons, depth if depth != word else None)
+
+
+def _word(severity: int) -> Word:
+    return "bad" if severity >= RUINOUS else "doubtful" if severity >= HARMFUL else "good"
 
 
 def verdict_of_look(look: Look | RigLook) -> Verdict:
@@ -79,15 +99,35 @@ def verdict_of_look(look: Look | RigLook) -> Verdict:
 
 
 def verdict_of_run(look: Look | RigLook, motion: Motion, aside: Sequence[SetAside] = (),
-                   frames: tuple[int, int | None] | None = None) -> Verdict:
+                   frames: tuple[int, int | None] | None = None, camera: Camera | None = None) -> Verdict:
     """The verdict on a run of a recording, from what the look found and what the run states of itself.
 
     `aside`: the entry `set_aside` of metrics.json. `frames`: number of frames, or of sets of several cameras, that were read, and number
-    that the films state; None if they do not.
+    that the films state; None if they do not. `camera`: the only one, along whose view errors are those of depth.
     """
     cameras = len(look.cameras) if isinstance(look, RigLook) else 1
-    of_motion = _cautions(motion, cameras, blind_frames(motion, aside, cameras))
-    return verdict_of(chain(_missing(*frames or (0, None)), of_motion, _without_cameras(aside, len(motion)), look.findings))
+    blind = blind_frames(motion, aside, cameras)
+    lengths, along = _expected_lengths(motion, camera)
+    of_depth = set[str]() if along is None else {limb for limb, joints in joints_of_limbs(motion.joint_names).items()
+                                                 if _mean_error(along[:, joints]) > _mean_error(lengths[:, joints])}  # fmt: skip
+    seen, kind = (motion.status != "absent") & ~blind, min(cameras, 2)
+    of_motion = chain(_losses(motion), _wide(lengths[seen], kind, "joints may be off by {mm:.0f} mm on average"),
+                      _doubtful_limbs(motion, kind, lengths[seen], [limb for limb in motion.limbs if limb not in of_depth]))
+    in_depth = [] if along is None else [
+        *_wide(along[seen], kind, "depths may be off by {mm:.0f} mm: add a camera aside"),
+        *_doubtful_limbs(motion, kind, along[seen], [limb for limb in motion.limbs if limb in of_depth])]  # fmt: skip
+    return verdict_of(chain(_missing(*frames or (0, None)), of_motion, _without_cameras(aside, len(motion)), look.findings), in_depth)
+
+
+def _expected_lengths(motion: Motion, camera: Camera | None) -> tuple[Array, Array | None]:
+    """Mean errors (T, J), metres, that the joints' standard deviations lead one to expect, and None; with an only `camera` those across its
+    view, and those along it."""
+    variances = motion.joint_sd**2
+    total = variances.sum(2)
+    if camera is None or not np.isfinite(total).any():
+        return MEAN_DISTANCE * np.sqrt(total), None
+    along = (variances * unit(motion.joints - camera.centre) ** 2).sum(2)
+    return np.sqrt(np.pi / 4 * np.maximum(total - along, 0)), np.sqrt(2 / np.pi * along)
 
 
 def _brief(words: str, severity: int, **evidence: float | str) -> Finding:
@@ -124,12 +164,11 @@ def expected_error(motion: Motion, blind: NDArray[np.bool_] | None = None) -> fl
     """Mean joint error, metres, that the stated standard deviations lead one to expect, a lost joint counted as 0.5 m; not a number where
     none is stated. `blind`: frames (T,) that are left out."""
     present = (motion.status != "absent") if blind is None else (motion.status != "absent") & ~blind
-    return _mean_error(motion.joint_sd[present])
+    return _mean_error(_expected_lengths(motion, None)[0][present])
 
 
-def _mean_error(deviations: NDArray[np.float64]) -> float:
-    """Mean error, metres, of joints with these standard deviations (T, J, 3), as `expected_error`."""
-    lengths = MEAN_DISTANCE * np.sqrt((deviations**2).sum(2))
+def _mean_error(lengths: Array) -> float:
+    """Mean of expected errors (T, J), metres, a joint without one counted as 0.5 m; not a number without any."""
     if not np.isfinite(lengths).any():
         return np.nan
     return float(np.where(np.isfinite(lengths), lengths, LOST_ERROR).mean())
@@ -144,24 +183,31 @@ def _without_cameras(aside: Sequence[SetAside], frames: int) -> Iterator[Finding
                      camera=camera, why=why, seconds=times[0]["from_s"], remedy=REMEDIES[why], frames=number)
 
 
-def _cautions(motion: Motion, cameras: int, blind: NDArray[np.bool_]) -> Iterator[Finding]:
+def _losses(motion: Motion) -> Iterator[Finding]:
+    """A reason if nobody was seen, or the person was often lost."""
     if not (motion.status != "absent").any():
         yield Finding("nobody was seen in any frame", "nobody was seen: film the empty scene and the person", RUINOUS)
-        return
-    lost, kind = lost_share(motion), min(cameras, 2)
-    if lost > OFTEN_LOST:
+    elif (lost := lost_share(motion)) > OFTEN_LOST:
         yield _brief("person lost in {percent:.0f} % of frames: look at overlay.mp4 (--overlay)",
                      RUINOUS if lost > MOSTLY_LOST else HARMFUL, percent=100 * lost)
-    error = expected_error(motion, blind)
+
+
+def _wide(lengths: Array, kind: int, words: str) -> Iterator[Finding]:
+    """A reason, in `words`, if expected errors (T, J), metres, are great."""
+    error = _mean_error(lengths)
     if error > WIDE[kind]:
-        yield _brief("joints may be off by {mm:.0f} mm on average", RUINOUS if error > FAR[kind] else HARMFUL, mm=1000 * error)
-    shares = {limb: float(np.isin(motion.limb_status[:, n], DOUBTFUL).mean()) for n, limb in enumerate(motion.limbs)}
-    seen = (motion.status != "absent") & ~blind
-    errors = {limb: _mean_error(motion.joint_sd[seen][:, joints]) for limb, joints in joints_of_limbs(motion.joint_names).items()}
+        yield _brief(words, RUINOUS if error > FAR[kind] else HARMFUL, mm=1000 * error)
+
+
+def _doubtful_limbs(motion: Motion, kind: int, lengths: Array, limbs: Sequence[str]) -> Iterator[Finding]:
+    """A reason for limbs that are often doubtful, and one for others that are at times, with expected errors (T, J) of the joints, m."""
+    doubtful = dict(zip(motion.limbs, np.isin(motion.limb_status, DOUBTFUL).mean(0).tolist() if len(motion) else (), strict=False))
+    shares = {limb: doubtful[limb] for limb in limbs if limb in doubtful}
+    errors = {limb: _mean_error(lengths[:, joints]) for limb, joints in joints_of_limbs(motion.joint_names).items()}
     often = [limb for limb, share in shares.items() if share > OFTEN_DOUBTFUL[kind] and not errors[limb] <= WIDE_LIMB[kind]]
     at_times = [limb for limb, share in shares.items() if share > OFTEN_LOST and limb not in often]
-    for limbs, weight in ((often, HARMFUL), (at_times, NOTED)):
-        for named, least, most in _together(limbs, shares):
+    for some, weight in ((often, HARMFUL), (at_times, NOTED)):
+        for named, least, most in _together(some, shares):
             share = "{least:.0f}" if round(least) == round(most) else "{least:.0f} to {most:.0f}"
             yield _brief(f"{named} doubtful in {share} % of frames", weight, least=least, most=most)
 
