@@ -12,7 +12,8 @@ from scans import scan, some_pose
 
 from benchmarks.detector import EXACT, detected
 from benchmarks.speed import naive_multi as naive
-from shadowpuppet.body.models import shares_of
+from shadowpuppet.body.anthropometry import SOLE
+from shadowpuppet.body.models import WHOLE, average_sizes, shares_of
 from shadowpuppet.body.sizes import AnatomicalSizes
 from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.errors import ShadowPuppetError
@@ -23,6 +24,7 @@ from shadowpuppet.tracking.multiview.bundle_adjustment import Deviations, solve_
 from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, Cloud, make_cloud
 from shadowpuppet.tracking.multiview.refinement.free_space import free_space
 from shadowpuppet.tracking.multiview.settings import SurfaceSettings
+from shadowpuppet.tracking.multiview.size_estimation import STATURE_KNOWN, known_stature
 
 MEAN = actor.sizes()
 NAMES = AnatomicalSizes.names()
@@ -231,13 +233,30 @@ def test_sizes_may_begin_elsewhere_than_where_they_are_expected():
 
 def test_deviations_that_sizes_share_are_those_of_their_covariance(rng):
     spread, shared = rng.uniform(0.01, 0.1, 7), rng.normal(0, 0.05, (2, 7))
-    np.testing.assert_allclose(bundle_adjustment._precision(spread, shared), np.linalg.inv(np.diag(spread**2) + shared.T @ shared))
+    both = np.diag(spread**2) + shared.T @ shared
+    np.testing.assert_allclose(Deviations(spread, shared).precision(0), np.linalg.inv(both))
     spread[[1, 4]] = 0
-    found, free = bundle_adjustment._precision(spread, shared), np.flatnonzero(spread)
+    found, free = Deviations(spread, shared).precision(0), np.flatnonzero(spread)
     both = np.diag(spread[free] ** 2) + shared[:, free].T @ shared[:, free]
     np.testing.assert_allclose(found[np.ix_(free, free)], np.linalg.inv(both))
     assert not found[[1, 4]].any()
-    np.testing.assert_array_equal(bundle_adjustment._precision(spread, None), np.diag([0 if s == 0 else 1 / s**2 for s in spread]))
+    np.testing.assert_array_equal(Deviations(spread).precision(1), np.diag([0 if s == 0 else 1 / s**2 for s in spread]))
+    assert Deviations(np.array([spread, 2 * spread])).precision(1)[0, 0] == Deviations(2 * spread).precision(0)[0, 0]
+
+
+def test_a_known_sum_of_sizes_leaves_their_differences_free(rng):
+    """Sizes with a known stature deviate as normal ones do whose sum is given: by Bayes' rule."""
+    spread, row = rng.uniform(0.01, 0.1, 5), np.array([[1.0, 1.0, 0.0, 1.0, 0.0]])
+    covariance = np.linalg.inv(Deviations(spread, sums=row / 1e-4).precision(0))
+    free = np.diag(spread**2)
+    given = free - free @ row.T @ np.linalg.inv(row @ free @ row.T) @ row @ free
+    np.testing.assert_allclose(covariance, given, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_the_sizes_of_an_average_person_add_up_to_the_stature(name):
+    sizes = average_sizes(name, 1.70)
+    assert float((known_stature(sizes) @ sizes.to_array())[0]) * STATURE_KNOWN == pytest.approx(1.70 - SOLE, abs=0.01)
 
 
 def test_whoever_is_taller_than_expected_is_taller_all_over():
