@@ -114,7 +114,7 @@ class Group:
         """Everybody present, tracked on their part of the silhouettes, with the odds of their front."""
         rngs = {person.number: self.rng(2, person.number, people) for person in people.present}
         shares = step({person.number: self.tracker_of(person, rngs[person.number]) for person in people.present}, frames.points,
-                      frames.seen.masks)
+                      frames.seen.masks, keypoints=frames.seen.keypoints)
 
         def faced(person: PersonState) -> PersonState:
             return self._faced(person, shares[person.number], frames.time, rngs[person.number])
@@ -237,10 +237,11 @@ class Group:
               rng: np.random.Generator) -> PersonState:
         """A person found at the place of a figure, beside the bodies of others; as they were if they are not found."""
         others = {number: body for number, body in bodies.items() if number != person.number}
-        found = start(self.subject(person.measured).tracker, rng, figure, others, frames.points, frames.seen.masks)
+        found = start(self.subject(person.measured).tracker, rng, figure, others, frames.points, frames.seen.masks,
+                      frames.seen.keypoints)
         if found is None or found.state.status == "lost":
             return person
-        front = person.front.begun(found.is_sided and person.measured.is_measured)
+        front = person.front.begun(found.is_shown or (found.is_sided and person.measured.is_measured))
         return person._replace(state=found.state, lost_since=None, before=None, front=front)
 
     def _known(self, people: PeopleState, found: Followed) -> list[PersonState]:

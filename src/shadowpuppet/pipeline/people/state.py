@@ -92,7 +92,8 @@ class PersonState(NamedTuple):
         """This person's part of the last frame set."""
         assert self.share is not None
         cameras = sum(mask is not None and bool(mask.any()) for mask in self.share.masks)
-        return HullObservation(self.share.points, Seen(tuple(self.share.masks)), cameras)
+        seen = Seen(tuple(self.share.masks), keypoints=tuple(self.share.keypoints))
+        return HullObservation(self.share.points, seen, cameras)
 
     def sizes_at(self, time: float) -> Measured:
         """The sizes with which the frame of a time (s) was tracked."""

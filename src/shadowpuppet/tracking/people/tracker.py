@@ -13,9 +13,12 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.body.whole_body import GLOBAL_DOFS, heading_column
 from shadowpuppet.camera.bits import Bits, count
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.threads import usable_cores
+from shadowpuppet.tracking.keypoints.front import CERTAIN
+from shadowpuppet.tracking.multiview.keypoint_evidence import KeypointEvidence
 from shadowpuppet.tracking.multiview.observation import Halves
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -26,6 +29,7 @@ from shadowpuppet.tracking.people.evidence import (
     PersonObservation,
     draw_person,
     ignored_pixels,
+    own_keypoints,
     predicted,
 )
 from shadowpuppet.tracking.people.figures import Figure
@@ -59,6 +63,8 @@ class Begun(NamedTuple):
     state: MultiviewState
     is_sided: bool
     """Whether the silhouettes tell the front from the back."""
+    is_shown: bool = False
+    """Whether keypoints do."""
 
 
 class Share(NamedTuple):
@@ -73,45 +79,54 @@ class Share(NamedTuple):
     """The body in its new pose."""
     ignored: Sequence[Bits | None] = ()
     """Pixels of each camera's picture of half the size that say nothing of this person."""
+    keypoints: Sequence[Keypoints | None] = ()
+    """This person's keypoints, one per camera; empty without any."""
 
 
 def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Mask | None],
-         beside: Mapping[int, Drawn] = MappingProxyType({})) -> dict[int, Share]:
-    """The people's states after a frame's surface points and masks (H, W), one per camera, of all of them together.
+         beside: Mapping[int, Drawn] = MappingProxyType({}), keypoints: Sequence[Keypoints | None] = ()) -> dict[int, Share]:
+    """The people's states after a frame's surface points, masks (H, W) and `keypoints`, one per camera, of all of them together.
 
     Each on the evidence that the others' bodies, in their predicted poses, do not explain; people who touch once more, with all bodies as
-    found. A lost person's body explains nothing. Cores share the people: none of them depends on another's result. `beside`: other people,
-    whose poses in this frame are known.
+    found. A lost person's body explains nothing, and has no keypoints. Cores share the people: none of them depends on another's result.
+    `beside`: other people, whose poses in this frame are known.
     """
     drawn = {n: draw_person(person.tracker, predicted(person.tracker.body, person.state)) for n, person in people.items()}
     lost, halves = {n for n, person in people.items() if person.state.status == "lost"}, Halves.of(masks)
     evidence = Division({**drawn, **beside}, lost, points, masks, halves)
 
+    def of_all(evidence: Division) -> dict[int, tuple[Keypoints | None, ...]]:
+        there = {n: body for n, body in evidence.drawn.items() if n not in lost}
+        return own_keypoints(next(iter(people.values())).tracker, there, keypoints) if people else {}
+
     def follow(n: int, evidence: Division) -> tuple[MultiviewState, Drawn]:
         tracker, rng, state = people[n]
         own, ignored = evidence.of(n)
         observation = PersonObservation(tracker.views, own, masks, None, ignored, halves)
+        observation.keypoints = tracker.shown(own, masks, theirs.get(n, ()), state.pose)
         state = _judged(tracker.follow(rng, state, observation))
         return state, draw_person(tracker, state.pose)
 
+    theirs = of_all(evidence)
     with ThreadPoolExecutor(max(min(len(people), usable_cores()), 1), "people") as pool:
         found = dict(zip(people, pool.map(lambda n: follow(n, evidence), people)))
         evidence = evidence.with_bodies({n: body for n, (_, body) in found.items()})
         if close := [n for n in touching(evidence.drawn) if n in people]:
+            theirs = of_all(evidence)
             found |= dict(zip(close, pool.map(lambda n: follow(n, evidence), close)))
             evidence = evidence.with_bodies({n: found[n][1] for n in close})
         own = dict(zip(people, pool.map(evidence.share, people)))
     shares = dict[int, Share]()
     for n, (state, body) in found.items():
         own_points, own_silhouettes, ignored = own[n]
-        shares[n] = Share(state, own_points, own_silhouettes, body, ignored)
+        shares[n] = Share(state, own_points, own_silhouettes, body, ignored, theirs.get(n, ()))
     return shares
 
 
 def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, drawn: Mapping[int, Drawn], points: SurfacePoints,
-          masks: Sequence[Mask | None]) -> Begun | None:
-    """The first state of a person at the place of a figure, beside those who are `drawn`; None if there are too few points. Points
-    and masks (H, W) as in `step`."""
+          masks: Sequence[Mask | None], keypoints: Sequence[Keypoints | None] = ()) -> Begun | None:
+    """The first state of a person at the place of a figure, beside those who are `drawn`; None if there are too few points. Points,
+    masks (H, W) and `keypoints` as in `step`."""
     mine = np.linalg.norm(points.points[:, :2] - figure.place, axis=1) < SAME_PLACE
     for other in drawn.values():
         mine &= other.distances(points.points) > 0.05
@@ -121,7 +136,11 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
     rough = person.search(rng, PersonObservation(person.views, own, [None] * len(masks)))  # the points alone: where the person is
     body = draw_person(person, rough.pose)
     observation = PersonObservation(person.views, own, masks, left_out=ignored_pixels(body, list(drawn.values()), masks))
-    found = person.search(rng, observation)  # beside others front and back hardly differ: both are tried
+    observation.keypoints = person.shown(own, masks, own_keypoints(person, {**drawn, 0: body}, keypoints).get(0, ()))
+    found = person.search(rng, observation)
+    if observation.keypoints is not None and observation.keypoints.toward(found.pose) > CERTAIN:
+        return Begun(_judged(found), is_sided=False, is_shown=True)
+    # beside others front and back hardly differ: both are tried
     other = _facing_the_other_way(person, rng, found, observation)
     best = max(found, other, key=lambda state: np.nan_to_num(state.overlap))
     share = Share(best, own, list(masks), draw_person(person, best.pose), observation.left_out)
@@ -140,7 +159,7 @@ def turn_round(person: MultiviewTracker, rng: np.random.Generator, share: Share)
 
 def follow_turned(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState, share: Share) -> MultiviewState:
     """The state after one of the body turned round, from the evidence of a share."""
-    return _judged(person.cycle(rng, state, observed(person, share)))
+    return _judged(person.cycle(rng, state, observed(person, share._replace(state=state))))
 
 
 def views_apart(share: Share) -> list[int]:
@@ -163,7 +182,14 @@ def shows_side(person: MultiviewTracker, share: Share) -> bool:
 
 def observed(person: MultiviewTracker, share: Share) -> PersonObservation:
     """What a share shows of a person, as it was followed."""
-    return PersonObservation(person.views, share.points, share.masks, left_out=share.ignored)
+    observation = PersonObservation(person.views, share.points, share.masks, left_out=share.ignored)
+    observation.keypoints = shown_of(person, share)
+    return observation
+
+
+def shown_of(person: MultiviewTracker, share: Share) -> KeypointEvidence | None:
+    """What a share's keypoints say of a person; None without any."""
+    return person.shown(share.points, share.masks, share.keypoints, share.state.pose) if share.keypoints else None
 
 
 def _facing_the_other_way(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState,
