@@ -6,12 +6,16 @@ import actor
 import numpy as np
 import pytest
 
+from benchmarks.detector import EXACT, detected_together
 from shadowpuppet.camera.bits import count, pack
+from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.people import tracker as module
 from shadowpuppet.tracking.people.evidence import draw_person
-from shadowpuppet.tracking.people.tracker import Person, at_pose, step, tells_front, turn_round
+from shadowpuppet.tracking.people.figures import Figure
+from shadowpuppet.tracking.people.front import Front, face
+from shadowpuppet.tracking.people.tracker import Person, at_pose, start, step, tells_front, turn_round
 
 POSE = actor.stance(actor.body().skeleton, 0.3, 0.2)
 HEADING = 3
@@ -67,3 +71,51 @@ def test_a_body_that_comes_round_again_does_not_face_the_other_way(monkeypatch, 
     found = turn_round(tracker, rng, share)
     assert found.status == "lost"
     assert found.overlap == 0
+
+
+def keypoints_of(*poses):
+    """What a detector finds in each camera of people in poses (D,), in any order."""
+    marks, skeleton = landmarks_of(actor.body()), actor.body().skeleton
+    people = [skeleton.points(pose[None], marks.joints, marks.places) for pose in poses]
+    return detected_together(np.random.default_rng(3), actor.cameras(), np.zeros(1), marks.names, people, EXACT)[0]
+
+
+def together(*poses):
+    """Surface points and masks of people in poses (D,)."""
+    masks = [np.logical_or.reduce(each) for each in zip(*(actor.masks(actor.body(), pose) for pose in poses))]
+    return actor.hull().points(masks), masks
+
+
+def test_each_person_has_the_keypoints_that_are_theirs():
+    other = actor.stance(actor.body().skeleton, -0.2, 2.0, (0.2, 0.8))
+    points, masks = together(POSE, other)
+    keypoints, tracker = keypoints_of(POSE, other), person()
+    people = {n: Person(tracker, np.random.default_rng(n), at(tracker, pose)) for n, pose in ((1, POSE), (2, other))}
+    shares = step(people, points, masks, keypoints=keypoints)
+    for share, pose in zip(shares.values(), (POSE, other)):
+        for own, alone in zip(share.keypoints, keypoints_of(pose)):
+            shown = np.nan_to_num(own.confidence) > 0
+            np.testing.assert_allclose(own.xy[shown], alone.xy[shown])
+            assert len(own.person) == 1
+        assert share.state.support > 0.95
+    lost = people | {2: people[2]._replace(state=people[2].state._replace(status="lost"))}
+    assert step(lost, points, masks, keypoints=keypoints)[2].keypoints == ()
+
+
+@pytest.mark.parametrize("turned", [0, np.pi])
+def test_keypoints_tell_the_first_front(rng, turned):
+    pose, tracker = actor.stance(actor.body().skeleton, 0.0, 0.2 + turned), person()
+    found = start(tracker, rng, Figure(np.zeros(2), 1.75), {}, *together(pose), keypoints_of(pose))
+    assert found is not None
+    assert found.is_shown
+    assert np.cos(found.state.pose[HEADING] - pose[HEADING]) > 0.9
+    assert found.state.support > 0.9
+
+
+def test_a_body_that_faces_the_other_way_than_keypoints_is_turned_round(rng):
+    wrong, tracker = POSE.copy(), person()
+    wrong[HEADING] += np.pi
+    share = step({1: Person(tracker, rng, at(tracker, POSE))}, *together(POSE), keypoints=keypoints_of(POSE))[1]
+    front, state = face(Front(0.0, False), tracker, rng, share._replace(state=at(tracker, wrong)), 0.0)
+    assert front.is_known
+    assert np.cos(state.pose[HEADING] - POSE[HEADING]) > 0.9

@@ -17,8 +17,8 @@ from shadowpuppet.tracking.keypoints.sights import NEAR, is_inside, sights_of
 
 People = tuple[int | None, ...]
 """Index of the person in each camera's keypoints; None for none."""
-FEWEST = 4
-"""Least number of landmarks of a person in a picture."""
+FAR = 0.3
+"""Distance (m) of a person in a picture from a body beyond which it is another person's."""
 
 
 def people_in(masks: Sequence[Mask | None], cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None]) -> People:
@@ -38,34 +38,39 @@ def people_in(masks: Sequence[Mask | None], cameras: Sequence[Camera], keypoints
 
 def people_at(points: Array, cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None], landmarks: Landmarks) -> People:
     """In each camera the person whose keypoints lie nearest to a body's landmarks (K, 3), on whichever side."""
-    if max((len(each.person) for each in keypoints if each is not None), default=0) == 1:
+    middle, number = points.mean(0), max((len(each.person) for each in keypoints if each is not None), default=0)
+    if number == 1:
         return tuple(0 if each is not None and len(each.person) else None for each in keypoints)
-    scores = (nearness([points], camera, each, landmarks)[0] for camera, each in zip(cameras, keypoints))
-    return tuple(int(each.argmax()) if each.any() else None for each in scores)
+    scores = np.zeros((number, len(cameras)))
+    for person in range(number):
+        chosen = [person if each is not None and person < len(each.person) else None for each in keypoints]
+        sights = sights_of(cameras, keypoints, chosen, landmarks, middle)
+        np.add.at(scores[person], sights.cameras, 1 / (1 + sights.squares_from(points, landmarks) / NEAR**2))
+    return tuple(int(each.argmax()) if each.any() else None for each in scores.T) if number else (None,) * len(cameras)
 
 
 def people_of(bodies: Sequence[Array], cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None],
               landmarks: Landmarks) -> list[People]:
-    """For each of N bodies, of landmarks (K, 3), the person in each camera: no two bodies have the same one, all together lie nearest, and
-    a body without a person near it has none there."""
+    """For each of N bodies, of landmarks (K, 3), the person in each camera; none if none is near. No two bodies have the same one: in each
+    picture the sum of the distances is least."""
     from scipy.optimize import linear_sum_assignment
 
     found = [[None for _ in cameras] for _ in bodies]
     for n, (camera, each) in enumerate(zip(cameras, keypoints)):
-        scores = nearness(bodies, camera, each, landmarks)
-        for body, person in zip(*map(np.ndarray.tolist, linear_sum_assignment(scores, maximize=True))):
-            if scores[body, person] > FEWEST / 2:
+        apart = _distances(bodies, camera, each, landmarks)
+        for body, person in zip(*map(np.ndarray.tolist, linear_sum_assignment(apart))):
+            if apart[body, person] < FAR:
                 found[body][n] = person
     return list(map(tuple, found))
 
 
-def nearness(bodies: Sequence[Array], camera: Camera, keypoints: Keypoints | None, landmarks: Landmarks) -> Array:
-    """Number of keypoints of each of P persons in a camera that lie near the landmarks (K, 3) of each of N bodies, on whichever side:
-    (N, P); one at a distance of `NEAR` counts as half."""
+def _distances(bodies: Sequence[Array], camera: Camera, keypoints: Keypoints | None, landmarks: Landmarks) -> Array:
+    """Distances (N, P), metres, at most `FAR`, of P persons in a camera from N bodies, of landmarks (K, 3): the median of the keypoints,
+    on whichever side."""
     number = 0 if keypoints is None else len(keypoints.person)
     sights = [sights_of([camera], [keypoints], [person], landmarks, bodies[0].mean(0)) for person in range(number)]
-    scores = [[(1 / (1 + each.squares_from(points, landmarks) / NEAR**2)).sum() for each in sights] for points in bodies]
-    return np.array(scores, float).reshape(len(bodies), number)
+    squares = [np.median([*each.squares_from(points, landmarks), FAR**2]) for points in bodies for each in sights]
+    return np.sqrt(squares).clip(max=FAR).reshape(len(bodies), number)
 
 
 def person_between(cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None], landmarks: Landmarks) -> tuple[People, Array]:

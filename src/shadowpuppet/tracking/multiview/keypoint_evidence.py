@@ -17,7 +17,7 @@ from shadowpuppet.camera.keypoints import Keypoints, cameras_with_persons
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.keypoints.candidates import candidates, pose_at, seem_wrong, triangulated_landmarks
-from shadowpuppet.tracking.keypoints.choice import FEWEST, people_at, people_in, person_between
+from shadowpuppet.tracking.keypoints.choice import people_at, people_in, person_between
 from shadowpuppet.tracking.keypoints.front import CERTAIN, KeypointFront, front_of
 from shadowpuppet.tracking.keypoints.likelihood import exchanges
 from shadowpuppet.tracking.keypoints.sights import NEAR, Sights, sights_of
@@ -25,6 +25,8 @@ from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
 from shadowpuppet.tracking.multiview.refinement.refiner import Pass, Refiner
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 
+FEWEST = 4
+"""Least number of landmarks of a person in a picture."""
 NO_POINTS = make_cloud(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
 
 
