@@ -18,6 +18,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.state import Measured
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, average_person, fit_in_views, known_person
 from shadowpuppet.tracking.multiview.size_estimation import MIN_FRAMES
+from shadowpuppet.tracking.people.evidence import chosen_of
 from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.presence import Followed, Sighting
 from shadowpuppet.tracking.people.tracker import VIEWS
@@ -37,7 +38,10 @@ def fit_apart(rng: np.random.Generator, floor: Floor, options: Options, rate: fl
     cameras, tall = floor.cameras, float(np.clip(Followed(tuple(seen)).height, *TALL))
     views = [views_of(floor, each.figure, each.others, each.masks) for each in seen]
     found = [tuple(None if mask is None else own for mask, own in zip(view, shown.get(each.time, ()))) for view, each in zip(views, seen)]
-    apart = [n for n, view in enumerate(views) if sum(mask is not None for mask in view) >= min(VIEWS, len(cameras))]
+    if not options.uses_silhouettes:
+        views, found = [each.masks for each in seen], [chosen_of(shown.get(each.time, ()), each.figure.people) for each in seen]
+    shows = [view if options.uses_silhouettes else own for view, own in zip(views, found)]
+    apart = [n for n, view in enumerate(shows) if sum(each is not None for each in view) >= min(VIEWS, len(cameras))]
     subject = None
     if len(apart) >= min(MIN_FRAMES, len(seen)):
         chosen = [apart[n] for n in evenly_spread(len(apart), MOST_SETS)]

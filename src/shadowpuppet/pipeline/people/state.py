@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shadowpuppet.camera.keypoints import cameras_with_persons
 from shadowpuppet.camera.mask import Seen
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import MotionFrame
@@ -92,6 +93,7 @@ class PersonState(NamedTuple):
         """This person's part of the last frame set."""
         assert self.share is not None
         cameras = sum(mask is not None and bool(mask.any()) for mask in self.share.masks)
+        cameras = cameras or cameras_with_persons(self.share.keypoints)
         seen = Seen(tuple(self.share.masks), keypoints=tuple(self.share.keypoints))
         return HullObservation(self.share.points, seen, cameras)
 

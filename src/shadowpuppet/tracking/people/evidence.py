@@ -22,7 +22,7 @@ from shadowpuppet.camera.keypoints import Keypoints, cameras_with_persons
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
-from shadowpuppet.tracking.keypoints.choice import people_of
+from shadowpuppet.tracking.keypoints.choice import People, people_of
 from shadowpuppet.tracking.multiview.observation import Halves, MultiviewObservation
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -92,10 +92,26 @@ def own_keypoints(tracker: MultiviewTracker, drawn: Mapping[int, Drawn],
                   keypoints: Sequence[Keypoints | None]) -> dict[int, tuple[Keypoints | None, ...]]:
     """The keypoints, one per camera, of each of the people who are `drawn`, by number: one person, or none, of those found in a camera;
     empty without keypoints. `tracker`: of any body."""
+    return {n: chosen_of(keypoints, own) for n, own in _chosen(tracker, drawn, keypoints).items()}
+
+
+def chosen_of(keypoints: Sequence[Keypoints | None], people: People) -> tuple[Keypoints | None, ...]:
+    """The keypoints, one per camera, of the person of an index in each."""
+    return tuple(None if each is None else each.only(person) for each, person in zip(keypoints, people))
+
+
+def other_keypoints(tracker: MultiviewTracker, drawn: Mapping[int, Drawn],
+                    keypoints: Sequence[Keypoints | None]) -> tuple[Keypoints | None, ...]:
+    """The keypoints, one per camera, in which nothing is known of the people who are `drawn`; else as `own_keypoints`."""
+    taken = zip(*_chosen(tracker, drawn, keypoints).values()) if drawn else [()] * len(keypoints)
+    return tuple(None if each is None else each.without(person for person in people if person is not None)
+                 for each, people in zip(keypoints, taken))
+
+
+def _chosen(tracker: MultiviewTracker, drawn: Mapping[int, Drawn], keypoints: Sequence[Keypoints | None]) -> dict[int, People]:
     if not drawn or not cameras_with_persons(keypoints):
         return {}
-    chosen = people_of([body.landmarks for body in drawn.values()], tracker.cameras, keypoints, tracker.refiner.landmarks)
-    return {n: tuple(None if each is None else each.only(person) for each, person in zip(keypoints, own)) for n, own in zip(drawn, chosen)}
+    return dict(zip(drawn, people_of([body.landmarks for body in drawn.values()], tracker.cameras, keypoints, tracker.refiner.landmarks)))
 
 
 def predicted(body: Body, state: MultiviewState) -> Array:

@@ -27,6 +27,7 @@ from shadowpuppet.tracking.people.evidence import (
     Division,
     Drawn,
     PersonObservation,
+    chosen_of,
     draw_person,
     ignored_pixels,
     own_keypoints,
@@ -127,6 +128,8 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
           masks: Sequence[Mask | None], keypoints: Sequence[Keypoints | None] = ()) -> Begun | None:
     """The first state of a person at the place of a figure, beside those who are `drawn`; None if there are too few points. Points,
     masks (H, W) and `keypoints` as in `step`."""
+    if figure.people:
+        return _start_by_keypoints(person, rng, points, masks, chosen_of(keypoints, figure.people))
     mine = np.linalg.norm(points.points[:, :2] - figure.place, axis=1) < SAME_PLACE
     for other in drawn.values():
         mine &= other.distances(points.points) > 0.05
@@ -145,6 +148,17 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
     best = max(found, other, key=lambda state: np.nan_to_num(state.overlap))
     share = Share(best, own, list(masks), draw_person(person, best.pose), observation.left_out)
     return Begun(_judged(best), tells_front(found.overlap, other.overlap) and shows_side(person, share))
+
+
+def _start_by_keypoints(person: MultiviewTracker, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None],
+                        keypoints: Sequence[Keypoints | None]) -> Begun | None:
+    """The first state of a person by `keypoints` of theirs alone; None if too few cameras show them."""
+    observation = PersonObservation(person.views, points, masks)
+    observation.keypoints = person.shown(points, masks, keypoints)
+    if not person.is_present(observation) or observation.keypoints is None:
+        return None
+    found = person.search(rng, observation)
+    return Begun(_judged(found), is_sided=False, is_shown=observation.keypoints.toward(found.pose) > CERTAIN)
 
 
 def tells_front(overlap: float, other: float) -> bool:
@@ -237,7 +251,7 @@ def _judged(state: MultiviewState) -> MultiviewState:
     """A state with the status of a person among others: hidden by them is uncertain, and without evidence lost, not absent."""
     if state.status == "absent":
         return state._replace(status="lost", overlap=0.0)
-    return state._replace(status="uncertain", overlap=0.0) if np.isnan(state.overlap) else state
+    return state._replace(status="uncertain", overlap=0.0) if np.isnan(state.agreement) else state
 
 
 def place_of(body: Body, state: MultiviewState) -> Array:
