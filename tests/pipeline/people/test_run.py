@@ -31,7 +31,7 @@ from shadowpuppet.pipeline import frame_process, progress
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.people import fitting
 from shadowpuppet.pipeline.people import run as module
-from shadowpuppet.pipeline.people.census import are_apart, people_in, sampled_sets, take_census
+from shadowpuppet.pipeline.people.census import are_apart, census_by_keypoints, people_in, sampled_sets, take_census
 from shadowpuppet.pipeline.people.fitting import fit_apart
 from shadowpuppet.pipeline.people.group import first_people
 from shadowpuppet.pipeline.people.run import check_people
@@ -42,6 +42,7 @@ from shadowpuppet.pipeline.prepare import MULTIVIEW
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.track import run as track_run
+from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.people.figures import find_people
 from shadowpuppet.tracking.people.views import views_of
@@ -156,6 +157,36 @@ def test_keypoints_tell_the_front_of_each_person(tracked, headings, tmp_path, mo
     for motion, heading in zip(sorted(people, key=lambda motion: motion.poses[0, 0]), headings):
         assert (np.cos(motion.poses[:, motion.dof_names.index("root_heading")] - heading) > 0.9).all()
         assert set(motion.status) == {"tracked"}
+
+
+def test_people_are_followed_by_keypoints_alone(tracked, tmp_path):
+    headings = (0.5, -2.0)
+    place = with_keypoints(shutil.copytree(tracked.recording, tmp_path / "recording"), headings)
+    shutil.rmtree(place / "masks")
+    options = make_options({"evidence": "keypoints", "overlay": True, "multiview": {"particles": 4}})
+    found = track_recording(place, tmp_path / "run", options)
+    assert "2 people are in the recording" in str(found.look.doubts[0])
+    people = [read_run(folder) for folder in person_folders(found.folder).values()]
+    people.sort(key=lambda each: each.motion.poses[0, 0])
+    assert len(people) == 2
+    for each, heading, x in zip(people, headings, (-0.8, 0.9)):
+        motion = each.motion
+        assert set(motion.status) == {"tracked"}
+        assert len(motion) == FRAMES
+        assert (np.cos(motion.poses[:, motion.dof_names.index("root_heading")] - heading) > 0.95).all()
+        assert motion.poses[0, 0] == pytest.approx(x, abs=0.05)
+        body = actor.body()
+        truth = body.points(np.array([actor.stance(body.skeleton, 0.0, heading, motion.poses[0, :2])]), names=motion.joint_names)
+        assert np.linalg.norm(motion.joints[0] - truth[0], axis=1).mean() < 0.05
+    assert (found.folder / "overlay.mp4").stat().st_size > 0
+
+
+def test_people_are_counted_by_keypoints_alone(tracked, tmp_path):
+    place = with_keypoints(shutil.copytree(tracked.recording, tmp_path / "recording"), (0.0, 0.0))
+    census = census_by_keypoints(open_rig(place, make_options({"evidence": "keypoints"})))
+    assert census is not None
+    assert census.number == 2
+    assert set(census.numbers) == {2}
 
 
 def test_sizes_are_measured_by_the_keypoints_of_views_that_show_a_person_apart(seen, monkeypatch):

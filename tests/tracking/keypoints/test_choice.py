@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.detector import EXACT, detected
 from shadowpuppet.camera.keypoints import Keypoints
-from shadowpuppet.tracking.keypoints.choice import people_at, people_in, people_of, person_between
+from shadowpuppet.tracking.keypoints.choice import people_at, people_between, people_in, people_of, person_between
 from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.keypoints.front import front_of
 from shadowpuppet.tracking.keypoints.sights import OUTLYING, sights_of
@@ -71,6 +71,24 @@ def test_a_body_without_a_person_near_it_has_none():
     nobody = both()[0].only(None)
     assert people_of([OWN, OTHER], CAMERAS, [nobody, None, *both()[2:]], MARKS) == [(None, None, 1, 1, 1), (None, None, 0, 0, 0)]
     assert people_of([OWN], CAMERAS, [nobody] * 5, MARKS) == [(None,) * 5]
+
+
+def test_people_are_groups_of_persons_whose_rays_meet():
+    third = OWN + np.array([-0.6, 0.4, 0.0])
+    keypoints = of(OWN, OTHER, third)
+    groups = people_between(CAMERAS, keypoints, MARKS)
+    assert sorted(people for people, _ in groups) == [(0, 2, 0, 2, 0), (1, 1, 1, 1, 1), (2, 0, 2, 0, 2)]
+    for people, places in groups:
+        np.testing.assert_allclose(places, [OWN, OTHER, third][people[0]], atol=1e-3)
+    unseen = people_between(CAMERAS, [keypoints[0].without([1]), keypoints[1].only(2), *keypoints[2:]], MARKS)
+    assert {people for people, _ in unseen} == {(0, 0, 0, 2, 0), (None, None, 1, 1, 1), (2, None, 2, 0, 2)}
+
+
+def test_one_camera_alone_and_nobody_are_no_group():
+    keypoints = of(OWN, OTHER)
+    assert people_between(CAMERAS, [keypoints[0], *[None] * 4], MARKS) == []
+    assert people_between(CAMERAS, [keypoints[0].only(0), keypoints[1].only(0), *[None] * 3], MARKS) == []  # two people, one each
+    assert people_between(CAMERAS, [each.only(None) for each in keypoints], MARKS) == []
 
 
 def test_without_silhouettes_the_person_is_one_whose_rays_meet_in_all_cameras():

@@ -113,8 +113,8 @@ def people_between(cameras: Sequence[Camera], keypoints: Sequence[Keypoints | No
         return triangulated_landmarks(Sights(*map(np.concatenate, zip(*(each[one] for one in chosen), strict=True))), landmarks)
 
     def near(sights: Sights, places: Array) -> float:
-        known = np.isfinite(places).all(1)[sights.landmarks]
-        away = np.where(known, sights.squares_from(np.nan_to_num(places), landmarks), np.inf)
+        known = np.asarray(np.isfinite(places).all(1))
+        away = np.where(known[sights.landmarks], sights.squares_from(np.nan_to_num(places), landmarks), np.inf)
         return float((1 / (1 + away / NEAR**2)).mean()) if len(away) else 0.0
 
     pairs = {pair: placed(pair) for pair in combinations(each, 2) if pair[0][0] != pair[1][0]}
