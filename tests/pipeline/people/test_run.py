@@ -197,6 +197,7 @@ def test_sizes_are_measured_by_the_keypoints_of_views_that_show_a_person_apart(s
     names = tuple(each.name for each in rig)
     monkeypatch.setattr(fitting, "fit_in_views", lambda *args, keypoints, **more: given.extend(zip(args[2], keypoints)) or average)
     average = average_person(np.random.default_rng(0), rig, make_options({}), 10.0, 1.7)
+    monkeypatch.setattr(fitting, "views_of", lambda floor, figure, others, masks: (masks[0], None, *masks[2:]))
     fit_apart(np.random.default_rng(0), census.floor, make_options({}), 10.0, one.sightings, {0.0: names, 2.0: names})
     assert len(given) == FRAMES
     for n, (view, found) in enumerate(given):

@@ -110,7 +110,8 @@ def people_between(cameras: Sequence[Camera], keypoints: Sequence[Keypoints | No
             for n, found in enumerate(keypoints) if found is not None for person in range(len(found.person))}  # fmt: skip
 
     def placed(chosen: Iterable[tuple[int, int]]) -> Array:
-        return triangulated_landmarks(Sights(*map(np.concatenate, zip(*(each[one] for one in chosen), strict=True))), landmarks)
+        sights = Sights(*map(np.concatenate, zip(*(each[one] for one in chosen), strict=True)))
+        return triangulated_landmarks(sights._replace(cameras=np.unique(sights.cameras, return_inverse=True)[1]), landmarks)
 
     def near(sights: Sights, places: Array) -> float:
         known = np.asarray(np.isfinite(places).all(1))
