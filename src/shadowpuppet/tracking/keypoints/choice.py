@@ -17,8 +17,8 @@ from shadowpuppet.tracking.keypoints.sights import NEAR, Sights, is_inside, sigh
 
 People = tuple[int | None, ...]
 """Index of the person in each camera's keypoints; None for none."""
-FAR = 0.3
-"""Distance (m) of a person in a picture from a body beyond which it is another person's."""
+APART = 0.45
+"""Least distance (m) of two people: a person in a picture who is farther from a body is another one."""
 
 
 def people_in(masks: Sequence[Mask | None], cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None]) -> People:
@@ -59,18 +59,18 @@ def people_of(bodies: Sequence[Array], cameras: Sequence[Camera], keypoints: Seq
     for n, (camera, each) in enumerate(zip(cameras, keypoints)):
         apart = _distances(bodies, camera, each, landmarks)
         for body, person in zip(*map(np.ndarray.tolist, linear_sum_assignment(apart))):
-            if apart[body, person] < FAR:
+            if apart[body, person] < APART:
                 found[body][n] = person
     return list(map(tuple, found))
 
 
 def _distances(bodies: Sequence[Array], camera: Camera, keypoints: Keypoints | None, landmarks: Landmarks) -> Array:
-    """Distances (N, P), metres, at most `FAR`, of P persons in a camera from N bodies, of landmarks (K, 3): the median of the keypoints,
+    """Distances (N, P), metres, at most `APART`, of P persons in a camera from N bodies, of landmarks (K, 3): the median of the keypoints,
     on whichever side."""
     number = 0 if keypoints is None else len(keypoints.person)
     sights = [sights_of([camera], [keypoints], [person], landmarks, bodies[0].mean(0)) for person in range(number)]
-    squares = [np.median([*each.squares_from(points, landmarks), FAR**2]) for points in bodies for each in sights]
-    return np.sqrt(squares).clip(max=FAR).reshape(len(bodies), number)
+    squares = [np.median([*each.squares_from(points, landmarks), APART**2]) for points in bodies for each in sights]
+    return np.sqrt(squares).clip(max=APART).reshape(len(bodies), number)
 
 
 def person_between(cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None], landmarks: Landmarks) -> tuple[People, Array]:

@@ -24,7 +24,7 @@ from shadowpuppet.camera.mask import Mask, Seen, half_size, may_be_person
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
 from shadowpuppet.threads import usable_cores
-from shadowpuppet.tracking.keypoints.choice import People, people_between
+from shadowpuppet.tracking.keypoints.choice import APART, People, people_between
 from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.keypoints.stature import height_between
 from shadowpuppet.tracking.people.floor import ASIDE, HEIGHTS, LEGS, TRUNK, Floor, Ground, figure_points, floor_under, pixel_index
@@ -36,8 +36,6 @@ EMPTY = 2.0
 """Weight of a part of a figure that is no silhouette, over one that is."""
 MIN_VIEWS = 2
 """Least number of cameras that have half of the figure's trunk in the picture."""
-APART = 0.45
-"""Least distance (m) of two people."""
 USUAL, UNUSUAL = 1.7, 0.3
 """Height (m) of people, and what another costs, in views for a metre: so that one whom a single camera shows has a place."""
 WIDE, HEAD = 0.22, 0.11
