@@ -102,8 +102,18 @@ def test_each_person_has_the_keypoints_that_are_theirs():
             np.testing.assert_allclose(own.xy[shown], alone.xy[shown])
             assert len(own.person) == 1
         assert share.state.support > 0.95
-    lost = people | {2: people[2]._replace(state=people[2].state._replace(status="lost"))}
-    assert step(lost, points, masks, keypoints=keypoints)[2].keypoints == ()
+
+
+def test_a_lost_person_has_the_keypoints_that_are_left(rng):
+    tracker = person()
+    there, lost = at(tracker, POSE), at(tracker, POSE)._replace(status="lost")
+    people = {n: Person(tracker, rng, state) for n, state in ((1, lost), (2, there))}
+    aside = actor.stance(actor.body().skeleton, 0.3, 0.2, (0.0, 0.3))
+    for keypoints, number in ((keypoints_of(POSE), 0), (keypoints_of(POSE, aside), 1)):
+        shares = step(people, *together(), keypoints=keypoints)
+        assert [len(each.person) for each in shares[2].keypoints] == [1] * actor.CAMERAS
+        assert {len(each.person) for each in shares[1].keypoints} == {number}
+    assert shares[1].state.status == "tracked"
 
 
 @pytest.mark.parametrize("turned", [0, np.pi])

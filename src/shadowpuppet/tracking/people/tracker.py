@@ -30,6 +30,7 @@ from shadowpuppet.tracking.people.evidence import (
     chosen_of,
     draw_person,
     ignored_pixels,
+    other_keypoints,
     own_keypoints,
     predicted,
 )
@@ -89,16 +90,20 @@ def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Ma
     """The people's states after a frame's surface points, masks (H, W) and `keypoints`, one per camera, of all of them together.
 
     Each on the evidence that the others' bodies, in their predicted poses, do not explain; people who touch once more, with all bodies as
-    found. A lost person's body explains nothing, and has no keypoints. Cores share the people: none of them depends on another's result.
-    `beside`: other people, whose poses in this frame are known.
+    found. A lost person's body explains nothing, and has keypoints that nobody else has. Cores share the people: none of them depends on
+    another's result. `beside`: other people, whose poses in this frame are known.
     """
     drawn = {n: draw_person(person.tracker, predicted(person.tracker.body, person.state)) for n, person in people.items()}
     lost, halves = {n for n, person in people.items() if person.state.status == "lost"}, Halves.of(masks)
     evidence = Division({**drawn, **beside}, lost, points, masks, halves)
 
     def of_all(evidence: Division) -> dict[int, tuple[Keypoints | None, ...]]:
-        there = {n: body for n, body in evidence.drawn.items() if n not in lost}
-        return own_keypoints(next(iter(people.values())).tracker, there, keypoints) if people else {}
+        there, away = ({n: body for n, body in evidence.drawn.items() if (n in lost) == is_lost} for is_lost in (False, True))
+        any_body = next((person.tracker for person in people.values()), None)
+        if any_body is None:
+            return {}
+        rest = other_keypoints(any_body, there, keypoints) if away else ()
+        return own_keypoints(any_body, there, keypoints) | own_keypoints(any_body, away, rest)
 
     def follow(n: int, evidence: Division) -> tuple[MultiviewState, Drawn]:
         tracker, rng, state = people[n]
