@@ -204,6 +204,25 @@ def test_sizes_are_measured_by_the_keypoints_of_views_that_show_a_person_apart(s
         assert found == (tuple(name if mask is not None else None for mask, name in zip(view, names)) if n in (0, 2) else ())
 
 
+def test_sizes_by_keypoints_alone_are_measured_by_the_persons_own(tracked, tmp_path, monkeypatch):
+    place = with_keypoints(shutil.copytree(tracked.recording, tmp_path / "recording"), (0.0, 0.0))
+    options = make_options({"evidence": "keypoints"})
+    survey = MULTIVIEW.survey(open_rig(place, options), options)
+    first, rig, given = survey.first, survey.rig.cameras, []
+    average = average_person(np.random.default_rng(0), rig, options, 10.0, 1.7)
+    monkeypatch.setattr(fitting, "fit_in_views", lambda *args, keypoints, **more: given.extend(keypoints) or average)
+    sets = [first.seen(n) for n in range(len(first.times))]
+    for one in first_people(survey.census.floor, first.times, sets):
+        given.clear()
+        fit_apart(np.random.default_rng(0), survey.census.floor, options, 10.0, one.sightings, dict(zip(first.times, first.keypoints)))
+        assert len(given) == len(sets)
+        for each, found in zip(one.sightings, given):
+            middle = [[*each.figure.place.tolist(), 1.0]]
+            assert [len(own.person) for own in found] == [1] * len(rig)
+            for camera, own in zip(rig, found):
+                assert np.linalg.norm(np.nanmedian(own.xy[0], axis=0) - camera.project(np.array(middle))[0]) < 8
+
+
 def surveyed(folder: Path, rig: list, masks: list):
     options = make_options({"masks": True})
     return MULTIVIEW.survey(open_rig(made_rig.write(folder / "recording", rig, masks), options), options).look
