@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.camera.camera import Camera
@@ -33,6 +34,8 @@ class Detector(NamedTuple):
 
 
 USUAL = Detector()
+HIDES = 0.12
+"""Distance (m) from a line of sight within which another person's joint hides what is behind."""
 EXACT = Detector(0.0, 0.4, 0.0, 0.0, 0.0, 0.0)
 DETECTORS = {"made": USUAL, "poor": Detector(scale=0.015, misses=0.3, exchanges=0.2, offset=0.02)}
 """Usual errors, and those of small or blurred people."""
@@ -45,6 +48,37 @@ def detected(rng: np.random.Generator, cameras: Sequence[Camera], times: Array, 
     beside = joints + (by.offset * _mirrored(rng.standard_normal((K, 3)), names) @ _trunk(names, joints))
     seen, nobody = [_in_one(rng, camera, times, names, beside, by) for camera in cameras], np.array([-1])
     return [[Keypoints(tuple(names), xy[t][None], sure[t][None], nobody, "made") for xy, sure in seen] for t in range(T)]
+
+
+def detected_together(rng: np.random.Generator, cameras: Sequence[Camera], times: Array, names: Sequence[str], people: Sequence[Array],
+                      by: Detector = USUAL) -> list[list[Keypoints]]:
+    """As `detected`, of several people's joints, each (T, K, 3), in an order that changes from frame to frame. Joints that another person
+    hides are missing; and persons, as often as single joints."""
+    alone = [detected(rng, cameras, times, names, joints, by) for joints in people]
+    found = [list[Keypoints]() for _ in times]
+    for c, camera in enumerate(cameras):
+        away = np.array([hidden(camera, own, [each for each in people if each is not own]) for own in people])
+        for n in range(len(people)):
+            for begin, end in _runs(rng, times, by.misses, 0.3, 0.3):
+                away[n, begin:end] = True
+        for t, frame in enumerate(found):
+            order = rng.permutation(len(people))
+            xy, sure = (np.concatenate([getattr(alone[n][t][c], what) for n in order]) for what in ("xy", "confidence"))
+            sure = np.where(away[order, t], 0.0, sure)
+            shown = sure.any(1)
+            frame.append(Keypoints(tuple(names), xy[shown], sure[shown], np.full(shown.sum(), -1), "made"))
+    return found
+
+
+def hidden(camera: Camera, own: Array, others: Sequence[Array]) -> NDArray[np.bool_]:
+    """Whether another person's joint, (T, J, 3) each, is before each of a person's joints (T, J, 3), in a camera."""
+    away, found = np.linalg.norm(own - camera.centre, axis=-1, keepdims=True), np.zeros(own.shape[:2], bool)
+    for other in others:
+        ray, to = (own - camera.centre) / away, other - camera.centre
+        along = np.einsum("tjk,tik->tji", ray, to)
+        beside = np.sqrt(np.maximum((to**2).sum(-1)[:, None] - along**2, 0))
+        found |= ((beside < HIDES) & (along < away - 0.3) & (along > 0)).any(-1)
+    return found
 
 
 def _in_one(rng: np.random.Generator, camera: Camera, times: Array, names: Sequence[str], joints: Array,

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 import smallest
-from detector import DETECTORS, detected
+from detector import DETECTORS, detected, detected_together
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.keypoints.film_keypoints import film_keypoints, write_keypoints
@@ -68,14 +68,17 @@ def with_keypoints(recording: Path, detector: str, seed: int = 0) -> Path:
         subprocess.run(list(map(str, command)), check=True)
         return found
     shutil.copytree(recording, found, dirs_exist_ok=True, ignore=shutil.ignore_patterns("keypoints"))
-    truth, rig = read_joints(recording / "truth.csv"), open_rig(recording, make_options({"evidence": "silhouettes"}))
-    columns = [truth.names.index(name) for name in JOINTS]
+    rig = open_rig(recording, make_options({"evidence": "silhouettes"}))
+    truths = [read_joints(path) for path in rig.recording.truths or (recording / "truth.csv",)]
+    people = [truth.positions[:, [truth.names.index(name) for name in JOINTS]] for truth in truths]
     cameras = [footage.view.camera for footage in rig.footage]
-    made = detected(np.random.default_rng([51, seed]), cameras, truth.times, JOINTS, truth.positions[:, columns], DETECTORS[detector])
-    frames = np.arange(len(made))
+    given = np.random.default_rng([51, seed]), cameras, truths[0].times, JOINTS
+    made = (detected(*given, people[0], DETECTORS[detector]) if len(people) == 1
+            else detected_together(*given, people, DETECTORS[detector]))  # fmt: skip
     (found / "keypoints").mkdir()
     for n, footage in enumerate(rig.footage):
-        xy, sure = (np.array([getattr(of[n], what)[0] for of in made]) for what in ("xy", "confidence"))
+        frames = np.repeat(np.arange(len(made)), [len(of[n].person) for of in made])
+        xy, sure = (np.concatenate([getattr(of[n], what) for of in made]) for what in ("xy", "confidence"))
         film = film_keypoints(JOINTS, frames, 0 * frames, xy, sure, detector, footage.view.camera.size)
         write_keypoints(found / "keypoints" / f"{footage.view.camera.name}.npz", film)
     return found

@@ -1,6 +1,6 @@
 """Several people before several cameras: are they counted, followed and not exchanged, and how much worse is each than alone?
 
-    python benchmarks/people.py FOLDER [--films N ...] [--shift S] [--masks]
+    python benchmarks/people.py FOLDER [--films N ...] [--shift S] [--masks] [--detector made]
 
 Makes the films of `FILMS` in FOLDER unless they are there, of 2, 3, 4 and 6 people before 4, 5 and 8 cameras, tracks each from the films
 (or, with `--masks`, from the exact silhouettes), and prints a line for each and what was asked of all. Films of two and three people who
@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import smallest
+from detector import DETECTORS, hidden
+from keypoints import with_keypoints
 from rich.console import Console
 from rich.table import Table
 
@@ -37,9 +39,8 @@ COLUMNS = ("film", "people", "cameras", "count right, %", "longest ghost, s", "l
            "uncertain, %", "silent, %", "sets/s")  # fmt: skip
 ALONE = {2: 1.5, 3: 2.0}
 """Greatest error asked of each of two or three people who walk round each other, over that of the same person alone."""
-SEEN, HIDES = 0.9, 0.12
-"""Share of a person's joints that two cameras must see for a miss to count; distance (m) from a line of sight within which another
-person's joint hides what is behind."""
+SEEN = 0.9
+"""Share of a person's joints that two cameras must see for a miss to count."""
 FAR_OFF = 0.3
 """Error (m) of a joint from which it is silent if it is vouched for."""
 
@@ -95,12 +96,7 @@ def seen_by_two(film: Path, joints: list[Array]) -> Array:
         for n, own in enumerate(joints):
             pixels = camera.project(own.reshape(-1, 3)).reshape(*own.shape[:2], 2)
             shown = ((pixels >= 0) & (pixels < np.array(camera.size))).all(-1)
-            away = np.linalg.norm(own - camera.centre, axis=-1, keepdims=True)
-            for other in (each for k, each in enumerate(joints) if k != n):
-                ray, to = (own - camera.centre) / away, other - camera.centre
-                along = np.einsum("tjk,tik->tji", ray, to)
-                beside = np.sqrt(np.maximum((to**2).sum(-1)[:, None] - along**2, 0))
-                shown &= ~((beside < HIDES) & (along < away - 0.3) & (along > 0)).any(-1)
+            shown &= ~hidden(camera, own, [each for k, each in enumerate(joints) if k != n])
             found[:, n] += shown.mean(-1) >= SEEN
     return found >= 2
 
@@ -116,10 +112,11 @@ def longest(flags: Array, step: float) -> float:
     return most * step
 
 
-def measure(film: Film, folder: Path, options: Options) -> dict:
-    """What a film's run is worth."""
+def measure(film: Film, folder: Path, options: Options, detector: str | None = None) -> dict:
+    """What a film's run is worth; `detector`: of the keypoints that are made, None for none."""
     path = made(folder / film.name, film.spec)
-    summary = track_recording(path, folder / f"{film.name}_run", options)
+    path = path if detector is None else with_keypoints(path, detector)
+    summary = track_recording(path, folder / f"{path.name}_run", options)
     truths = [read_truth(path / f"truth_{n + 1}.csv") for n in range(film.people)]
     times, pelvis = truths[0].times, truths[0].names.index("pelvis")
     joints = [truth.positions for truth in truths]
@@ -213,13 +210,14 @@ def main() -> None:
     parser.add_argument("--shift", type=int, default=0, help="added to the films' seeds: other people, clothes and rooms")
     parser.add_argument("--masks", action="store_true", help="exact silhouettes instead of the films")
     parser.add_argument("--tiny", action="store_true", help="one film of two people, of a few small pictures")
+    parser.add_argument("--detector", choices=DETECTORS, help="keypoints as this detector makes them, beside silhouettes")
     args = smallest.parse(parser, lambda folder: (folder, "--tiny", "--masks"))
     options, console = make_options({"masks": args.masks}), Console(width=150)
     chosen = [replace(film, seed=film.seed + args.shift) for film in (FILMS[n] for n in args.films)]
     films = [Film("dance", 2, 3, 1, 2.0, "96x72", 2.0)] if args.tiny else chosen
     table, every, alone = Table(*COLUMNS, box=None), list[dict](), dict[str, dict[str, float]]()
     for film in films:
-        every.append(measure(film, args.folder, options))
+        every.append(measure(film, args.folder, options, args.detector))
         if film.together == "round" and film.people in ALONE:
             alone[film.name] = errors_alone(film, args.folder, options)
         table.add_row(*row(every[-1], alone.get(film.name, {})))

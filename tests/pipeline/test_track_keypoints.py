@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from benchmarks.detector import Detector, detected
-from shadowpuppet.errors import RecordingError, SettingsError, ShadowPuppetWarning, TrackingError
+from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.keypoints.film_keypoints import film_keypoints, write_keypoints
 from shadowpuppet.io.run import read_run
 from shadowpuppet.pipeline.options import make_options
@@ -99,8 +99,6 @@ def test_a_wrong_scale_is_said_and_a_hopeless_one_refused(rig_recording, walk, t
 def test_what_cannot_be_is_refused(rig_recording, walk, tmp_path):
     with pytest.raises(RecordingError, match="no keypoints of camera 'cam1' in it"):
         track_recording(rig_recording, tmp_path / "run", make_options(BY_KEYPOINTS))
-    with pytest.raises(SettingsError, match="people: found 2 with keypoints alone, expected 1"):
-        track_recording(walk, tmp_path / "run", make_options(BY_KEYPOINTS | {"people": 2}))
     empty = with_keypoints(rig_recording, tmp_path / "empty", frames=0)
     with pytest.raises(TrackingError, match="the detector found no person in two cameras at the same time"):
         track_recording(empty, tmp_path / "run", make_options(BY_KEYPOINTS))

@@ -44,6 +44,17 @@ class Keypoints:
         """The same in pictures of another size than the film's (width, height)."""
         return replace(self, xy=(self.xy + 0.5) * np.divide(to, size) - 0.5)
 
+    def only(self, person: int | None) -> Keypoints:
+        """The same with the person of an index alone; None: with none."""
+        chosen = slice(0, 0) if person is None else slice(person, person + 1)
+        return replace(self, xy=self.xy[chosen], confidence=self.confidence[chosen], person=self.person[chosen])
+
+    def without(self, persons: Iterable[int]) -> Keypoints:
+        """The same, in which nothing is known of the persons of some indices."""
+        confidence = self.confidence.copy()
+        confidence[list(persons)] = 0
+        return replace(self, confidence=confidence)
+
 
 def cameras_with_persons(keypoints: Iterable[Keypoints | None]) -> int:
     """Number of cameras in which a detector found a person; `keypoints`: of one moment, one per camera."""

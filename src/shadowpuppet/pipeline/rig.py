@@ -145,8 +145,6 @@ def open_rig(path: str | Path, options: Options) -> Rig:
         raise SettingsError(f"background: found one for {len(views)} cameras, expected one each, background/<camera>.* in the recording")
     if (options.people or 1) > 1 and len(views) == 1:
         raise SettingsError(f"people: found {options.people} for one camera, expected 1: two calibrated cameras or more track several")
-    if (options.people or 1) > 1 and not options.uses_silhouettes:
-        raise SettingsError(f"people: found {options.people} with keypoints alone, expected 1: several people need silhouettes, too")
     if options.region is not None and len(views) > 1:
         raise SettingsError(f"region: found a region for {len(views)} cameras, expected it with one camera only (--camera)")
     return Rig(recording, tuple(camera_footage(recording, view, options) for view in views), inputs.without(others))

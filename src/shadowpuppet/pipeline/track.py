@@ -100,7 +100,7 @@ def _run_people(writer: RunWriter, survey: Survey, options: Options, listener: L
     people = PeopleRun(writer, survey, survey.census, options, entries, listener)
     found = people.track(*rngs, smooth_run)
     if not found:
-        raise TrackingError(f"{survey.look.recording}: nobody is found in the silhouettes of {survey.census.number} people")
+        raise TrackingError(f"{survey.look.recording}: none of {survey.census.number} people is found")
     if len(found) < min(survey.census.number, options.people or survey.census.number):
         warn(f"{survey.look.recording}: {survey.census.number} people were counted, {len(found)} could be followed: a person whom few "
              f"cameras show whole, or who is seen for less than a second, is not; if there are no more, give --people {len(found)}")

@@ -55,7 +55,7 @@ def scene(monkeypatch):
         now.fits += 1
         return Measured(np.full(3, float(now.fits)), 1.7, "", {}, now.measured)
 
-    def step(people, points, masks):
+    def step(people, points, masks, keypoints=()):
         found = {}
         for number, person in people.items():
             here = person.state.pose

@@ -8,32 +8,42 @@ import tomllib
 from dataclasses import replace
 from pathlib import Path
 
+import actor
 import made
 import made_rig
 import numpy as np
 import pytest
 from solids import Ellipsoid, ring, seen_by
 
+from benchmarks import detector
+from shadowpuppet.camera.keypoints import cameras_with_persons
 from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import NOTED, FormatError, SettingsError, ShadowPuppetError, ShadowPuppetWarning
 from shadowpuppet.geometry import rigid, rotation_about
 from shadowpuppet.io.checkpoint import FRAMES as EXACT
 from shadowpuppet.io.checkpoint import STATE
 from shadowpuppet.io.files.lock import LOCK
+from shadowpuppet.io.keypoints.film_keypoints import film_keypoints, write_keypoints
 from shadowpuppet.io.people import person_folders, read_places
 from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import CompleteRun
 from shadowpuppet.pipeline import frame_process, progress
 from shadowpuppet.pipeline.options import make_options
+from shadowpuppet.pipeline.people import fitting
 from shadowpuppet.pipeline.people import run as module
-from shadowpuppet.pipeline.people.census import are_apart, people_in, sampled_sets, take_census
+from shadowpuppet.pipeline.people.census import are_apart, census_by_keypoints, people_in, sampled_sets, take_census
+from shadowpuppet.pipeline.people.fitting import fit_apart
 from shadowpuppet.pipeline.people.group import first_people
 from shadowpuppet.pipeline.people.run import check_people
+from shadowpuppet.pipeline.people.state import Measured
 from shadowpuppet.pipeline.people.truths import matched_truths
+from shadowpuppet.pipeline.person_rig import average_person
 from shadowpuppet.pipeline.prepare import MULTIVIEW
 from shadowpuppet.pipeline.progress import Listener
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.track import run as track_run
+from shadowpuppet.pipeline.track import track_recording
+from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.people.figures import find_people
 from shadowpuppet.tracking.people.views import views_of
 
@@ -91,7 +101,10 @@ def tracked(seen, tmp_path_factory):
     def track(folder, listener=None, resume=False, counted=2, place=None, **changed):
         shown = replace(survey, census=replace(survey.census, number=counted))
         kind = MULTIVIEW._replace(survey=lambda *_, **__: shown)
-        seen = opened if place is None else replace(open_rig(place, options), footage=opened.footage)
+        other = None if place is None else open_rig(place, options)
+        if other is not None and any(each.keypoints is not None for each in other.footage):
+            shown = MULTIVIEW.survey(other, options)
+        seen = opened if other is None else replace(other, footage=opened.footage)
         return track_run(seen, kind, folder, replace(options, **changed), listener or Listener(), resume=resume)
 
     track.recording = recording
@@ -105,6 +118,109 @@ def run(tracked, tmp_path_factory):
         patch.setattr(progress, "CHECKPOINT_SECONDS", 0.0)
         patch.setattr(progress, "CHECKPOINT_COST", 0.0)
         return tracked(folder, Kills(folder))
+
+
+def with_keypoints(recording: Path, headings: tuple[float, float]) -> Path:
+    """The recording with what a detector finds of its two people, who face some ways (rad), in any order."""
+    body, made = actor.body(), cameras()
+    marks = landmarks_of(body)
+    poses = [[actor.stance(body.skeleton, 0.0, heading, place) for place in places] for heading, places in zip(headings, (
+        [(-0.8 + 0.04 * n, 0.3) for n in range(FRAMES)], [(0.9, -0.2 - 0.04 * n) for n in range(FRAMES)]))]  # fmt: skip
+    joints = [body.skeleton.points(np.array(each), marks.joints, marks.places) for each in poses]
+    found = detector.detected_together(np.random.default_rng(5), made, np.arange(FRAMES) / made_rig.RATE, marks.names, joints,
+                                       detector.EXACT)
+    (recording / "keypoints").mkdir()
+    for n, camera in enumerate(made):
+        frame = np.repeat(np.arange(FRAMES), [len(seen[n].person) for seen in found])
+        xy, sure = (np.concatenate([getattr(seen[n], what) for seen in found]) for what in ("xy", "confidence"))
+        film = film_keypoints(marks.names, frame, 0 * frame, xy, sure, "made", camera.size)
+        write_keypoints(recording / "keypoints" / f"{camera.name}.npz", film)
+    return recording
+
+
+@pytest.mark.parametrize("headings", [(0.0, np.pi)])
+def test_keypoints_tell_the_front_of_each_person(tracked, headings, tmp_path, monkeypatch):
+    """The silhouettes of these people are the same from before and behind, and their sizes average ones: without keypoints nothing of them
+    is vouched for."""
+    given = list[int]()
+
+    def fit(rng, floor, options, rate, seen, shown):
+        given.extend(cameras_with_persons(shown[each.time]) for each in seen)
+        return Measured.of(average_person(rng, floor.cameras, options, rate, 1.75))
+
+    monkeypatch.setattr(module, "fit_apart", fit)
+    found = tracked(tmp_path / "run", place=with_keypoints(shutil.copytree(tracked.recording, tmp_path / "recording"), headings),
+                    overlay=False)
+    people = [read_run(folder).motion for folder in person_folders(found.folder).values()]
+    assert len(people) == 2
+    assert given == [len(cameras())] * 2 * FRAMES
+    for motion, heading in zip(sorted(people, key=lambda motion: motion.poses[0, 0]), headings):
+        assert (np.cos(motion.poses[:, motion.dof_names.index("root_heading")] - heading) > 0.9).all()
+        assert set(motion.status) == {"tracked"}
+
+
+def test_people_are_followed_by_keypoints_alone(tracked, tmp_path):
+    headings = (0.5, -2.0)
+    place = with_keypoints(shutil.copytree(tracked.recording, tmp_path / "recording"), headings)
+    shutil.rmtree(place / "masks")
+    options = make_options({"evidence": "keypoints", "overlay": True, "multiview": {"particles": 4}})
+    found = track_recording(place, tmp_path / "run", options)
+    assert "2 people are in the recording" in str(found.look.doubts[0])
+    people = [read_run(folder) for folder in person_folders(found.folder).values()]
+    people.sort(key=lambda each: each.motion.poses[0, 0])
+    assert len(people) == 2
+    for each, heading, x in zip(people, headings, (-0.8, 0.9)):
+        motion = each.motion
+        assert set(motion.status) == {"tracked"}
+        assert len(motion) == FRAMES
+        assert (np.cos(motion.poses[:, motion.dof_names.index("root_heading")] - heading) > 0.95).all()
+        assert motion.poses[0, 0] == pytest.approx(x, abs=0.05)
+        body = actor.body()
+        truth = body.points(np.array([actor.stance(body.skeleton, 0.0, heading, motion.poses[0, :2])]), names=motion.joint_names)
+        assert np.linalg.norm(motion.joints[0] - truth[0], axis=1).mean() < 0.05
+    assert (found.folder / "overlay.mp4").stat().st_size > 0
+
+
+def test_people_are_counted_by_keypoints_alone(tracked, tmp_path):
+    place = with_keypoints(shutil.copytree(tracked.recording, tmp_path / "recording"), (0.0, 0.0))
+    census = census_by_keypoints(open_rig(place, make_options({"evidence": "keypoints"})))
+    assert census is not None
+    assert census.number == 2
+    assert set(census.numbers) == {2}
+
+
+def test_sizes_are_measured_by_the_keypoints_of_views_that_show_a_person_apart(seen, monkeypatch):
+    rig, masks = seen
+    census = take_census(rig, sets_of(masks))
+    assert census is not None
+    (one, _), given = first_people(census.floor, np.arange(FRAMES), sets_of(masks)), []
+    names = tuple(each.name for each in rig)
+    monkeypatch.setattr(fitting, "fit_in_views", lambda *args, keypoints, **more: given.extend(zip(args[2], keypoints)) or average)
+    average = average_person(np.random.default_rng(0), rig, make_options({}), 10.0, 1.7)
+    monkeypatch.setattr(fitting, "views_of", lambda floor, figure, others, masks: (masks[0], None, *masks[2:]))
+    fit_apart(np.random.default_rng(0), census.floor, make_options({}), 10.0, one.sightings, {0.0: names, 2.0: names})
+    assert len(given) == FRAMES
+    for n, (view, found) in enumerate(given):
+        assert found == (tuple(name if mask is not None else None for mask, name in zip(view, names)) if n in (0, 2) else ())
+
+
+def test_sizes_by_keypoints_alone_are_measured_by_the_persons_own(tracked, tmp_path, monkeypatch):
+    place = with_keypoints(shutil.copytree(tracked.recording, tmp_path / "recording"), (0.0, 0.0))
+    options = make_options({"evidence": "keypoints"})
+    survey = MULTIVIEW.survey(open_rig(place, options), options)
+    first, rig, given = survey.first, survey.rig.cameras, []
+    average = average_person(np.random.default_rng(0), rig, options, 10.0, 1.7)
+    monkeypatch.setattr(fitting, "fit_in_views", lambda *args, keypoints, **more: given.extend(keypoints) or average)
+    sets = [first.seen(n) for n in range(len(first.times))]
+    for one in first_people(survey.census.floor, first.times, sets):
+        given.clear()
+        fit_apart(np.random.default_rng(0), survey.census.floor, options, 10.0, one.sightings, dict(zip(first.times, first.keypoints)))
+        assert len(given) == len(sets)
+        for each, found in zip(one.sightings, given):
+            middle = [[*each.figure.place.tolist(), 1.0]]
+            assert [len(own.person) for own in found] == [1] * len(rig)
+            for camera, own in zip(rig, found):
+                assert np.linalg.norm(np.nanmedian(own.xy[0], axis=0) - camera.project(np.array(middle))[0]) < 8
 
 
 def surveyed(folder: Path, rig: list, masks: list):

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.detector import EXACT, detected
 from shadowpuppet.camera.keypoints import Keypoints
-from shadowpuppet.tracking.keypoints.choice import people_at, people_in, person_between
+from shadowpuppet.tracking.keypoints.choice import people_at, people_between, people_in, people_of, person_between
 from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.keypoints.front import front_of
 from shadowpuppet.tracking.keypoints.sights import OUTLYING, sights_of
@@ -41,6 +41,54 @@ def test_the_person_is_the_one_nearest_to_the_body_on_whichever_side():
     assert people_at(OWN[MARKS.mirrored], CAMERAS, both(), MARKS) == (1,) * len(CAMERAS)
     nobody = Keypoints(MARKS.names, np.zeros((0, len(MARKS.names), 2)), np.zeros((0, len(MARKS.names))), np.zeros(0, np.int64), "made")
     assert people_at(OWN, CAMERAS, [nobody, None, *both()[2:]], MARKS) == (None, None, 1, 1, 1)
+
+
+def of(*bodies: np.ndarray) -> list[Keypoints]:
+    """Persons at the landmarks of bodies (K, 3), by camera, in another order in every second one."""
+    every = [detected(np.random.default_rng(0), CAMERAS, np.zeros(1), MARKS.names, each[None], EXACT)[0] for each in bodies]
+    found = []
+    for n, seen in enumerate(zip(*every)):
+        order = seen[::-1] if n % 2 else seen
+        xy, sure = (np.concatenate([getattr(each, what) for each in order]) for what in ("xy", "confidence"))
+        found.append(Keypoints(MARKS.names, xy, sure, np.arange(len(bodies)), "made"))
+    return found
+
+
+def test_people_who_cross_do_not_have_the_same_person():
+    """Both predicted bodies are nearest to the same person: one of them is a step behind."""
+    along = np.array([1.0, 0, 0])
+    keypoints = of(OWN, OWN + 0.3 * along)
+    bodies = [OWN + 0.2 * along, OWN + 0.5 * along]
+    assert [people_at(each, CAMERAS, keypoints, MARKS) for each in bodies] == [(1, 0, 1, 0, 1)] * 2
+    assert people_of(bodies, CAMERAS, keypoints, MARKS) == [(0, 1, 0, 1, 0), (1, 0, 1, 0, 1)]
+    assert people_of(bodies[::-1], CAMERAS, keypoints, MARKS) == [(1, 0, 1, 0, 1), (0, 1, 0, 1, 0)]
+    assert people_of([bodies[0][MARKS.mirrored], bodies[1]], CAMERAS, keypoints, MARKS)[0] == (0, 1, 0, 1, 0)
+
+
+def test_a_body_without_a_person_near_it_has_none():
+    assert people_of([OWN, OTHER], CAMERAS, of(OTHER), MARKS) == [(None,) * 5, (0,) * 5]
+    assert people_of([OWN], CAMERAS, of(OTHER), MARKS) == [(None, None, None, 0, None)]  # one camera sees one behind the other
+    nobody = both()[0].only(None)
+    assert people_of([OWN, OTHER], CAMERAS, [nobody, None, *both()[2:]], MARKS) == [(None, None, 1, 1, 1), (None, None, 0, 0, 0)]
+    assert people_of([OWN], CAMERAS, [nobody] * 5, MARKS) == [(None,) * 5]
+
+
+def test_people_are_groups_of_persons_whose_rays_meet():
+    third = OWN + np.array([-0.6, 0.4, 0.0])
+    keypoints = of(OWN, OTHER, third)
+    groups = people_between(CAMERAS, keypoints, MARKS)
+    assert sorted(people for people, _ in groups) == [(0, 2, 0, 2, 0), (1, 1, 1, 1, 1), (2, 0, 2, 0, 2)]
+    for people, places in groups:
+        np.testing.assert_allclose(places, [OWN, OTHER, third][people[0]], atol=1e-3)
+    unseen = people_between(CAMERAS, [keypoints[0].without([1]), keypoints[1].only(2), *keypoints[2:]], MARKS)
+    assert {people for people, _ in unseen} == {(0, 0, 0, 2, 0), (None, None, 1, 1, 1), (2, None, 2, 0, 2)}
+
+
+def test_one_camera_alone_and_nobody_are_no_group():
+    keypoints = of(OWN, OTHER)
+    assert people_between(CAMERAS, [keypoints[0], *[None] * 4], MARKS) == []
+    assert people_between(CAMERAS, [keypoints[0].only(0), keypoints[1].only(0), *[None] * 3], MARKS) == []  # two people, one each
+    assert people_between(CAMERAS, [each.only(None) for each in keypoints], MARKS) == []
 
 
 def test_without_silhouettes_the_person_is_one_whose_rays_meet_in_all_cameras():

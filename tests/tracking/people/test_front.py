@@ -86,8 +86,9 @@ def test_the_body_faces_where_its_toes_point(heading):
 
 @pytest.fixture
 def seen(monkeypatch):
-    """What frames show: the overlap of the body turned round, whether from the side; `followed` faces for some seconds."""
-    now = SimpleNamespace(other=0.75, side=True, status="tracked", facing=np.array([1.0, 0.0]), way=np.zeros(2), turns=0)
+    """What frames show: the overlap of the body turned round, whether from the side, the odds that keypoints tell; `followed` faces for
+    some seconds."""
+    now = SimpleNamespace(told=0.0, other=0.75, side=True, status="tracked", facing=np.array([1.0, 0.0]), way=np.zeros(2), turns=0)
 
     def turned(*given):
         return SimpleNamespace(overlap=now.other, status=now.status, pose="turned")
@@ -98,6 +99,7 @@ def seen(monkeypatch):
 
     monkeypatch.setattr(module, "turn_round", turn_round)
     monkeypatch.setattr(module, "follow_turned", turned)
+    monkeypatch.setattr(module, "shown_of", lambda *given: SimpleNamespace(toward=lambda pose: now.told) if now.told else None)
     monkeypatch.setattr(module, "shows_side", lambda tracker, share: now.side)
     monkeypatch.setattr(module, "step_of", lambda body, pose, time: Step(time, now.way * time, now.facing))
     now.time = 0.0
@@ -106,7 +108,7 @@ def seen(monkeypatch):
         states = []
         for _ in range(round(seconds * RATE)):
             share = Share(SimpleNamespace(overlap=0.75, status="tracked", pose="here"), None, [], None)
-            front, state = face(front, SimpleNamespace(body=None), None, share, now.time, **more)
+            front, state = face(front, SimpleNamespace(body=None, rate=RATE), None, share, now.time, **more)
             front = front if front.is_known else front.with_frame(MotionFrame(now.time, "tracked"), MotionFrame(now.time, "lost"))
             states.append(state.pose)
             now.time += 1 / RATE
@@ -167,6 +169,33 @@ def test_a_quick_turn_is_undone_if_the_body_turned_back_fits_as_well(seen, lead,
     front, states = seen.followed(front, 1 / RATE)
     assert front.is_known == undone
     assert states == ["turned" if undone else "here"]
+
+
+@pytest.mark.parametrize(("told", "pose", "turns"), [(30.0, "here", 0), (-30.0, "turned", 1)])
+def test_keypoints_that_are_certain_tell_the_front_at_once(seen, told, pose, turns):
+    seen.told = told
+    front, states = seen.followed(Front().begun(is_known=False), 1 / RATE)
+    assert front.is_known
+    assert front.odds >= KNOWN
+    assert (states, seen.turns) == ([pose], turns)
+
+
+def test_keypoints_that_are_less_certain_tell_it_later(seen):
+    seen.told = 4.0
+    front, _ = seen.followed(Front().begun(is_known=False), 3 / RATE)
+    assert not front.is_known
+    front, states = seen.followed(front, 1.0)
+    assert front.is_known
+    assert "turned" not in states
+
+
+def test_keypoints_turn_a_known_front_round_and_let_people_walk_backwards(seen):
+    seen.told = -100.0
+    front, states = seen.followed(Front(), 1 / RATE)
+    assert front.is_known
+    assert states == ["turned"]
+    seen.told, seen.way = 8.0, np.array([-1.2, 0.0])
+    assert "turned" not in seen.followed(front, 3.0)[1]
 
 
 def test_known_fronts_cost_nothing(seen):

@@ -151,7 +151,7 @@ class FirstSeconds(NamedTuple):
 
     def seen(self, n: int) -> Seen:
         """What the cameras show at time `n`."""
-        return Seen(self.masks[n], self.shadows[n] if len(self.shadows) else ())
+        return Seen(self.masks[n], self.shadows[n] if len(self.shadows) else (), keypoints=self.keypoints[n] if self.keypoints else ())
 
 
 @dataclass(frozen=True, eq=False)

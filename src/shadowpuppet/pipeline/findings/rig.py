@@ -28,7 +28,7 @@ from shadowpuppet.pipeline.findings.scale import error_in, moments_of
 from shadowpuppet.pipeline.findings.upright import up_caution
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.people.census import Census, are_apart, later_sets, sampled_sets, take_census
+from shadowpuppet.pipeline.people.census import Census, are_apart, later_sets, people_finding, sampled_sets, take_census
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.threads import one_opencv_thread
@@ -89,8 +89,7 @@ def survey_rig(rig: Rig, options: Options, listener: Listener | None = None, fil
         found = (None if scale is None else scale.caution(), up_caution(rig.cameras, walk, options.multiview))
         doubts = [each for each in found if each is not None] + doubts
     if several and options.people != 1:
-        doubts.insert(0, Finding.of("{people} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
-                                    "{people} people: each is tracked", NOTED, people=several))
+        doubts.insert(0, people_finding(several))
     elif counted > 1:
         doubts.insert(0, Finding.of("{people} people were counted; one is tracked, others are ignored (--people 1)",
                                     "{people} people: one is tracked, others are ignored", NOTED, people=counted))

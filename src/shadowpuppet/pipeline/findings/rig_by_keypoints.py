@@ -20,6 +20,7 @@ from shadowpuppet.pipeline.findings.opening import OPENING, opening_of, read_set
 from shadowpuppet.pipeline.findings.scale import PEOPLE, WRONG, ScaleError
 from shadowpuppet.pipeline.footage import Footage
 from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.people.census import census_by_keypoints, people_finding
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.pipeline.subject import average_body
@@ -58,7 +59,12 @@ def survey_keypoints(rig: Rig, options: Options, listener: Listener | None = Non
                                       "these films, and were they begun together? calibrate again, or say in [start] of recording.toml "
                                       "when each began", "cameras and calibration do not fit: calibrate again", RUINOUS,
                                       mm=1000 * found.apart))
-    return Survey(rig, (), (), first, replace(look, refusal=refusal, findings=() if refusal else tuple(findings)))
+    census = census_by_keypoints(rig) if rig.is_multiview and options.people != 1 else None
+    if census is not None and options.people is not None:
+        census = replace(census, number=options.people)
+    if census is not None and census.number > 1:
+        findings.insert(0, people_finding(census.number))
+    return Survey(rig, (), (), first, replace(look, refusal=refusal, findings=() if refusal else tuple(findings)), census)
 
 
 def _scale(rig: Rig, seen: Sequence[Sequence[Keypoints | None]], options: Options) -> ScaleError | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, Seen
+from shadowpuppet.errors import NOTED, Finding
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.pipeline.footage import CameraFrame, Footage, Sample
 from shadowpuppet.pipeline.rig import Rig, shown_in
@@ -96,6 +97,23 @@ def take_census(cameras: Sequence[Camera], sets: Sequence[Seen], later: Sequence
         every = list(pool.map(lambda seen: find_people(floor, seen), sets))
     numbers, certain = tuple(map(sure_number, every)), [certain_number(figures) for figures in every]
     return Census(max(counted(numbers[:begun]), counted(numbers[begun:]), counted(certain, share=0.0)), floor, numbers)
+
+
+def census_by_keypoints(rig: Rig) -> Census | None:
+    """The people whose keypoints' rays meet, at `SETS` moments spread over all films; None if there are none."""
+    ends = [film.frame[-1] / rate - footage.view.start for footage, rate in zip(rig.footage, rig.rates)
+            if (film := footage.keypoints) is not None and len(film.frame)]  # fmt: skip
+    floor, blind = Floor(rig.cameras, 0.0, np.zeros((0, 2)), 0.0, np.zeros((0, 0, 0, 0), np.int32)), (None,) * len(rig.cameras)
+    times = np.linspace(rig.recording.begin, max(min(ends, default=0.0), rig.recording.begin), SETS)
+    sets = [Seen(blind, keypoints=tuple(footage.keypoints_at(float(time)) for footage in rig.footage)) for time in times]
+    numbers = tuple(len(find_people(floor, seen)) for seen in sets)
+    return Census(counted(numbers), floor, numbers) if any(numbers) else None
+
+
+def people_finding(number: int) -> Finding:
+    """Says that a number of people are tracked."""
+    return Finding.of("{people} people are in the recording: each is tracked, into person-1, person-2, ... of the run",
+                      "{people} people: each is tracked", NOTED, people=number)
 
 
 def are_apart(sets: Sequence[Seen]) -> bool:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from shadowpuppet.body.models import sizes_kind
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import evenly_spread
 from shadowpuppet.io.person import Person, read_person
@@ -17,6 +18,7 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.state import Measured
 from shadowpuppet.pipeline.person_rig import MultiviewSubject, average_person, fit_in_views, known_person
 from shadowpuppet.tracking.multiview.size_estimation import MIN_FRAMES
+from shadowpuppet.tracking.people.evidence import chosen_of
 from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.presence import Followed, Sighting
 from shadowpuppet.tracking.people.tracker import VIEWS
@@ -29,18 +31,24 @@ TALL = 0.8, 2.3
 """Least and greatest height of a person, metres, that is expected of a figure; the sizes are refined from there."""
 
 
-def fit_apart(rng: np.random.Generator, floor: Floor, options: Options, rate: float, seen: Sequence[Sighting]) -> Measured:
-    """The sizes of one person, fitted to frame sets; `rate`: frames/s. A person who is not seen apart in enough views has the average sizes
-    for the figure's height."""
+def fit_apart(rng: np.random.Generator, floor: Floor, options: Options, rate: float, seen: Sequence[Sighting],
+              shown: Mapping[float, Sequence[Keypoints | None]]) -> Measured:
+    """The sizes of one person, fitted to frame sets; `rate`: frames/s; `shown`: keypoints, by camera, of some of their times. A person who
+    is not seen apart in enough views has the average sizes for the figure's height."""
     cameras, tall = floor.cameras, float(np.clip(Followed(tuple(seen)).height, *TALL))
     views = [views_of(floor, each.figure, each.others, each.masks) for each in seen]
-    apart = [view for view in views if sum(mask is not None for mask in view) >= min(VIEWS, len(cameras))]
+    found = [tuple(None if mask is None else own for mask, own in zip(view, shown.get(each.time, ()))) for view, each in zip(views, seen)]
+    if not options.uses_silhouettes:
+        views, found = [each.masks for each in seen], [chosen_of(shown.get(each.time, ()), each.figure.people) for each in seen]
+    shows = [view if options.uses_silhouettes else own for view, own in zip(views, found)]
+    apart = [n for n, view in enumerate(shows) if sum(each is not None for each in view) >= min(VIEWS, len(cameras))]
     subject = None
     if len(apart) >= min(MIN_FRAMES, len(seen)):
         chosen = [apart[n] for n in evenly_spread(len(apart), MOST_SETS)]
         with contextlib.suppress(TrackingError):
             # fronts are found while people are tracked
-            subject = fit_in_views(rng, cameras, chosen, replace(options, height=None), rate, tall, both_fronts=False)
+            subject = fit_in_views(rng, cameras, [views[n] for n in chosen], replace(options, height=None), rate, tall, both_fronts=False,
+                                   keypoints=[found[n] for n in chosen])
     return Measured.of(subject or average_person(rng, cameras, options, rate, tall))
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.keypoints import cameras_with_persons
 from shadowpuppet.camera.mask import Seen
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.geometry import Array
@@ -21,7 +22,7 @@ from shadowpuppet.pipeline.subject import motion_frame
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints, VisualHull
 from shadowpuppet.tracking.people.appearance import Colours, apart_from, colours_of_body, colours_of_figure, dressed_parts
-from shadowpuppet.tracking.people.evidence import Drawn, draw_person, predicted
+from shadowpuppet.tracking.people.evidence import Drawn, draw_person, other_keypoints, predicted
 from shadowpuppet.tracking.people.figures import Figure, drawn, find_people
 from shadowpuppet.tracking.people.floor import Floor
 from shadowpuppet.tracking.people.front import face
@@ -53,6 +54,11 @@ class Frames(NamedTuple):
     images: Sequence[NDArray[np.uint8] | None] = ()
     """A picture (H, W, 3) or (H, W) that fits the silhouettes, per camera; empty: clothes are not looked at."""
 
+    @property
+    def by_keypoints(self) -> bool:
+        """Whether keypoints alone show people, to two cameras or more."""
+        return all(mask is None for mask in self.seen.masks) and cameras_with_persons(self.seen.keypoints) > 1
+
 
 @dataclass(frozen=True, eq=False)
 class Group:
@@ -70,7 +76,7 @@ class Group:
 
     def next(self, people: PeopleState, frames: Frames) -> PeopleState:
         """The people after one more frame set."""
-        if not people.is_begun and len(frames.points.points):
+        if not people.is_begun and (len(frames.points.points) or frames.by_keypoints):
             people = self.start(people, frames)._replace(is_begun=True)
         after = self._tracked(people, frames)
         if frames.time >= people.due:
@@ -114,7 +120,7 @@ class Group:
         """Everybody present, tracked on their part of the silhouettes, with the odds of their front."""
         rngs = {person.number: self.rng(2, person.number, people) for person in people.present}
         shares = step({person.number: self.tracker_of(person, rngs[person.number]) for person in people.present}, frames.points,
-                      frames.seen.masks)
+                      frames.seen.masks, keypoints=frames.seen.keypoints)
 
         def faced(person: PersonState) -> PersonState:
             return self._faced(person, shares[person.number], frames.time, rngs[person.number])
@@ -149,7 +155,11 @@ class Group:
         """See who is who, and find new, returning and lost people among the figures that no tracked body explains."""
         bodies = {person.number: person.share.drawn for person in people.present
                   if person.share is not None and person.lost_since is None}  # fmt: skip
-        figures = find_people(self.floor, frames.seen, explained(bodies))
+        seen = frames.seen
+        if frames.by_keypoints and people.present:
+            tracker = self.subject(people.present[0].measured).tracker
+            seen = seen._replace(keypoints=other_keypoints(tracker, bodies, seen.keypoints))
+        figures = find_people(self.floor, seen, explained(bodies))
         places = [self.place(person) for person in people.present if person.lost_since is None]
         found = [each for each in sightings(frames.time, figures, frames.seen.masks)
                  if all(np.linalg.norm(place - each.figure.place) > SAME_PLACE for place in places)]  # fmt: skip
@@ -237,10 +247,11 @@ class Group:
               rng: np.random.Generator) -> PersonState:
         """A person found at the place of a figure, beside the bodies of others; as they were if they are not found."""
         others = {number: body for number, body in bodies.items() if number != person.number}
-        found = start(self.subject(person.measured).tracker, rng, figure, others, frames.points, frames.seen.masks)
+        found = start(self.subject(person.measured).tracker, rng, figure, others, frames.points, frames.seen.masks,
+                      frames.seen.keypoints)
         if found is None or found.state.status == "lost":
             return person
-        front = person.front.begun(found.is_sided and person.measured.is_measured)
+        front = person.front.begun(found.is_shown or (found.is_sided and person.measured.is_measured))
         return person._replace(state=found.state, lost_since=None, before=None, front=front)
 
     def _known(self, people: PeopleState, found: Followed) -> list[PersonState]:

@@ -29,7 +29,7 @@ def measured_later(person: PersonState, subject: MultiviewSubject, rng: np.rando
         return person
     if not front.is_known and (front.other is None or time - front.since < SETTLING or not shows_side(subject.tracker, share)):
         return person
-    kept = share._replace(masks=tuple(share.masks), ignored=tuple(share.ignored))
+    kept = share._replace(masks=tuple(share.masks), ignored=tuple(share.ignored), keypoints=())
     frames = [*person.shown, Shown(time, kept, None if front.is_known or front.other is None else front.other.pose)]
     frames = [each for each in frames if front.is_known or each.turned is not None][-SETS:]
     if len(frames) < SETS or frames[-1].time - frames[0].time < SECONDS - 1e-6:

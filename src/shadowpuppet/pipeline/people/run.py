@@ -157,6 +157,7 @@ class PeopleRun:
         """How people are followed; and those of the first seconds, measured, or those of a checkpoint."""
         rate, floor, first, options = self.rig.rate / self.options.every, self.census.floor, self.survey.first, self.options
         subjects, known = dict[bytes, MultiviewSubject](), None if options.person is None else known_sizes(options)
+        shown = dict(zip(first.times, first.keypoints))
         fit_seed, track_seed = (int(rng.integers(2**63)) for rng in (for_fit, for_track))
 
         def subject(measured: Measured) -> MultiviewSubject:
@@ -166,7 +167,7 @@ class PeopleRun:
             return subjects[key]
 
         def fit(rng: np.random.Generator, seen: Sequence[Sighting]) -> Measured:
-            return fit_apart(rng, floor, options, rate, seen) if known is None else known
+            return fit_apart(rng, floor, options, rate, seen, shown) if known is None else known
 
         hull = VisualHull(self.rig.cameras, options.multiview.hull, company=True)
         group = Group(floor, hull, fit, subject, track_seed, options.people)

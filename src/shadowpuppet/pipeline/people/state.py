@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shadowpuppet.camera.keypoints import cameras_with_persons
 from shadowpuppet.camera.mask import Seen
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import MotionFrame
@@ -92,7 +93,9 @@ class PersonState(NamedTuple):
         """This person's part of the last frame set."""
         assert self.share is not None
         cameras = sum(mask is not None and bool(mask.any()) for mask in self.share.masks)
-        return HullObservation(self.share.points, Seen(tuple(self.share.masks)), cameras)
+        cameras = cameras or cameras_with_persons(self.share.keypoints)
+        seen = Seen(tuple(self.share.masks), keypoints=tuple(self.share.keypoints))
+        return HullObservation(self.share.points, seen, cameras)
 
     def sizes_at(self, time: float) -> Measured:
         """The sizes with which the frame of a time (s) was tracked."""

@@ -10,6 +10,7 @@ from shadowpuppet.body.anthropometry import SOLE, stature_of
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.keypoints import Keypoints
+from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.keypoints.candidates import triangulated_landmarks
 from shadowpuppet.tracking.keypoints.choice import person_between
 from shadowpuppet.tracking.keypoints.definitions import Landmarks
@@ -23,10 +24,17 @@ BONES = {"thigh_length": ("hip", "knee"), "shank_length": ("knee", "ankle"), "up
 def height_by_bones(cameras: Sequence[Camera], frames: Sequence[Sequence[Keypoints | None]], landmarks: Landmarks) -> float | None:
     """Height (m), shoes on, of the person that a few frames' keypoints, by camera, show; from medians of the bones' lengths over frames and
     sides. None if no bone is seen by two cameras."""
-    lengths = {bone: list[float]() for bone in BONES}
+    every = list[Array]()
     for keypoints in frames:
         people, middle = person_between(cameras, keypoints, landmarks)
-        places = triangulated_landmarks(sights_of(cameras, keypoints, people, landmarks, middle), landmarks)
+        every.append(triangulated_landmarks(sights_of(cameras, keypoints, people, landmarks, middle), landmarks))
+    return height_between(every, landmarks)
+
+
+def height_between(frames: Sequence[Array], landmarks: Landmarks) -> float | None:
+    """The same of the landmarks' places (K, 3) in a few frames."""
+    lengths = {bone: list[float]() for bone in BONES}
+    for places in frames:
         for bone, ends in BONES.items():
             for side in SIDES:
                 above, below = (places[landmarks.names.index(f"{side}_{end}")] for end in ends)

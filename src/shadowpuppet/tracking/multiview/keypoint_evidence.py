@@ -91,6 +91,11 @@ class KeypointEvidence:
         headings = self.either_way[:, heading_column(self.refiner.body.skeleton)]
         return front_of(headings, self.refiner.surprises(self.either_way, self.sights))
 
+    def toward(self, pose: Array) -> float:
+        """Log odds for the way that a pose (D,) faces; 0 if the keypoints do not tell."""
+        column = heading_column(self.refiner.body.skeleton)
+        return 0.0 if self.front is None else self.front.odds * float(np.sign(np.cos(self.front.heading - pose[column])))
+
     def against(self, pose: Array) -> float:
         """Log odds against the way that a pose (D,) faces; 0 if the keypoints show no other."""
         column = heading_column(self.refiner.body.skeleton)

@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.camera.bits import Bits, count, grown_bits, is_set, unpack
+from shadowpuppet.camera.keypoints import Keypoints, cameras_with_persons
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
+from shadowpuppet.tracking.keypoints.choice import People, people_of
 from shadowpuppet.tracking.multiview.observation import Halves, MultiviewObservation
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -45,6 +47,8 @@ class Drawn(NamedTuple):
     """Centres of spheres along the limbs, world, of shape (K, 3), metres."""
     radii: Array
     """Radii of these spheres, of shape (K,), metres."""
+    landmarks: Array = np.zeros((0, 3))
+    """Places of the landmarks that a detector finds, world, of shape (L, 3), metres."""
 
     def distances(self, points: Array) -> Array:
         """Distances (P,), metres, of points (P, 3) from the body: negative inside, infinite where it is far."""
@@ -77,11 +81,37 @@ class PersonObservation(MultiviewObservation):
 
 def draw_person(tracker: MultiviewTracker, pose: Array) -> Drawn:
     """A person in a pose (D,)."""
-    spheres = tracker.refiner.spheres
-    centres = tracker.body.skeleton.points(pose[None], spheres.joints, spheres.places)[0]
+    spheres, marks = tracker.refiner.spheres, tracker.refiner.landmarks
+    centres, places = (tracker.body.skeleton.points(pose[None], each.joints, each.places)[0] for each in (spheres, marks))
     pictures = tracker.views.pictures
     return Drawn(tuple(picture.draw(pose) for picture in pictures), tuple(picture.camera.size[0] for picture in pictures), centres,
-                 spheres.radii)  # fmt: skip
+                 spheres.radii, places)  # fmt: skip
+
+
+def own_keypoints(tracker: MultiviewTracker, drawn: Mapping[int, Drawn],
+                  keypoints: Sequence[Keypoints | None]) -> dict[int, tuple[Keypoints | None, ...]]:
+    """The keypoints, one per camera, of each of the people who are `drawn`, by number: one person, or none, of those found in a camera;
+    empty without keypoints. `tracker`: of any body."""
+    return {n: chosen_of(keypoints, own) for n, own in _chosen(tracker, drawn, keypoints).items()}
+
+
+def chosen_of(keypoints: Sequence[Keypoints | None], people: People) -> tuple[Keypoints | None, ...]:
+    """The keypoints, one per camera, of the person of an index in each."""
+    return tuple(None if each is None else each.only(person) for each, person in zip(keypoints, people))
+
+
+def other_keypoints(tracker: MultiviewTracker, drawn: Mapping[int, Drawn],
+                    keypoints: Sequence[Keypoints | None]) -> tuple[Keypoints | None, ...]:
+    """The keypoints, one per camera, in which nothing is known of the people who are `drawn`; else as `own_keypoints`."""
+    taken = zip(*_chosen(tracker, drawn, keypoints).values()) if drawn and cameras_with_persons(keypoints) else [()] * len(keypoints)
+    return tuple(None if each is None else each.without(person for person in people if person is not None)
+                 for each, people in zip(keypoints, taken))
+
+
+def _chosen(tracker: MultiviewTracker, drawn: Mapping[int, Drawn], keypoints: Sequence[Keypoints | None]) -> dict[int, People]:
+    if not drawn or not cameras_with_persons(keypoints):
+        return {}
+    return dict(zip(drawn, people_of([body.landmarks for body in drawn.values()], tracker.cameras, keypoints, tracker.refiner.landmarks)))
 
 
 def predicted(body: Body, state: MultiviewState) -> Array:

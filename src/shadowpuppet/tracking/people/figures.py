@@ -8,16 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.sizes import HEIGHTS as PEOPLE
 from shadowpuppet.camera.camera import Camera
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask, Seen, half_size, may_be_person
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
 from shadowpuppet.threads import usable_cores
+from shadowpuppet.tracking.keypoints.choice import APART, People, people_between
+from shadowpuppet.tracking.keypoints.definitions import landmarks_of
+from shadowpuppet.tracking.keypoints.stature import height_between
 from shadowpuppet.tracking.people.floor import ASIDE, HEIGHTS, LEGS, TRUNK, Floor, Ground, figure_points, floor_under, pixel_index
 
 NEEDED = 0.65
@@ -27,8 +36,6 @@ EMPTY = 2.0
 """Weight of a part of a figure that is no silhouette, over one that is."""
 MIN_VIEWS = 2
 """Least number of cameras that have half of the figure's trunk in the picture."""
-APART = 0.45
-"""Least distance (m) of two people."""
 USUAL, UNUSUAL = 1.7, 0.3
 """Height (m) of people, and what another costs, in views for a metre: so that one whom a single camera shows has a place."""
 WIDE, HEAD = 0.22, 0.11
@@ -56,14 +63,18 @@ class Figure(NamedTuple):
     """Metres, from the floor."""
     evidence: float = 0.0
     """In views, see `NEEDED`."""
+    people: People = ()
+    """Index of the person in each camera's keypoints; empty: found in silhouettes."""
 
 
 def find_people(floor: Floor, seen: Seen, explained: Sequence[Mask | None] = ()) -> list[Figure]:
     """The people in one frame set, the most certain first.
 
     What was taken for shadow may be dark legs, and is no evidence, neither for people nor against them; nor is silhouette in pixels
-    (H / 2, W / 2), by camera, that people who are known already explain, `explained`.
+    (H / 2, W / 2), by camera, that people who are known already explain, `explained`. Without silhouettes people are found in keypoints.
     """
+    if all(mask is None for mask in seen.masks):
+        return _find_by_keypoints(floor.cameras, seen.keypoints)
     state, used = _states(seen, explained)
     scores = np.full((len(floor.places), len(HEIGHTS)), -np.inf)
     unusual = UNUSUAL * np.abs(np.array(HEIGHTS) - USUAL)
@@ -83,6 +94,22 @@ def find_people(floor: Floor, seen: Seen, explained: Sequence[Mask | None] = ())
             flat[mask.ravel() & (flat == NEW)] = KNOWN
         left = left[np.linalg.norm(floor.places[left] - place, axis=1) >= APART]
     return _without_ghosts(floor, seen, explained, found)
+
+
+def _find_by_keypoints(cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None]) -> list[Figure]:
+    """The people whose keypoints' rays meet, of a person's height, each in a place of their own."""
+    found, landmarks = list[Figure](), landmarks_of(_average_body())
+    for people, places in people_between(cameras, keypoints, landmarks) if keypoints else ():
+        height, place = height_between([places], landmarks), np.nanmean(places[:, :2], axis=0)
+        alone = all(np.linalg.norm(place - other.place) >= APART for other in found)
+        if alone and height is not None and PEOPLE[0] < height < PEOPLE[1]:
+            found.append(Figure(place, height, float(sum(person is not None for person in people)), people))
+    return found
+
+
+@cache
+def _average_body() -> Body:
+    return make_body("anatomical", average_sizes("anatomical", AVERAGE_HEIGHT))
 
 
 def _without_ghosts(floor: Floor, seen: Seen, explained: Sequence[Mask | None], found: list[Figure]) -> list[Figure]:

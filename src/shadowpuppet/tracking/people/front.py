@@ -1,8 +1,9 @@
 """Which way a person faces, as log odds of the body as it is tracked against the same body turned round.
 
 Beside others one frame hardly distinguishes front and back. While the odds decide nothing the person is followed both ways. A body that
-fits better, seen from the side, adds to the odds, and so does the way that a person walks, as people walk forwards. Evidence is forgotten
-within a second, as neighbouring frames are not independent. Once the front is known it is so for the undecided frames before, too.
+fits better, seen from the side, adds to the odds, and so does the way that a person walks, as people walk forwards. Keypoints may tell at
+once: then no other body is followed. Evidence is forgotten within a second, as neighbouring frames are not independent. Once the front is
+known it is so for the undecided frames before, too.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
-from shadowpuppet.tracking.people.tracker import Share, follow_turned, shows_side, turn_round
+from shadowpuppet.tracking.people.tracker import Share, follow_turned, shown_of, shows_side, turn_round
 
 KNOWN, MOST = 3.0, 6.0
 """Log odds from which on the front is known, 20 to 1; greatest log odds, so that evidence against them counts soon."""
@@ -87,6 +88,10 @@ class Front(NamedTuple):
             return self._replace(odds=-KNOWN if self.is_known else -odds, steps=(step,), other=None, undecided=turned), True
         return self._replace(odds=float(np.clip(odds, -MOST, MOST)), steps=(*steps, step)), False
 
+    def told(self, odds: float) -> Front:
+        """The front after keypoints told log odds for the way that the body faces."""
+        return self._replace(odds=float(np.clip(self.odds + odds, -MOST, MOST)))
+
     def _faded(self, step: Step) -> float:
         return self.odds * float(np.exp((self.steps[-1].time - step.time) / MEMORY)) if self.steps else self.odds
 
@@ -107,13 +112,19 @@ def face(front: Front, tracker: MultiviewTracker, rng: np.random.Generator, shar
     `fit_tells`: whether overlaps count, which with average sizes are too alike."""
     seconds = time - front.steps[-1].time if front.steps else 0.0
     front, is_quick = front.moved(step_of(tracker.body, share.state.pose, time))
+    seen = shown_of(tracker, share)
+    told = 0.0 if seen is None else seen.toward(share.state.pose) * 2 / tracker.rate
+    front = front.told(told) if told else front
     if front.is_known and front.odds > -KNOWN:
         return front, share.state
+    if told > 0 and front.odds >= KNOWN:
+        return front.found(wrong=False), share.state
+    is_wrong = told < 0 and front.odds <= -KNOWN
     if front.other is None:
         other = turn_round(tracker, rng, share)
         doubt = PER_OVERLAP * MEMORY * lead(share.state, other) if front.is_known or is_quick else 0.0
         odds = float(np.clip(front.odds + doubt, -MOST, MOST))
-        if front.is_known and odds < 0 and other.status != "lost":
+        if (front.is_known or is_wrong) and odds < 0 and other.status != "lost":
             return front.found(wrong=True), other
         front = front._replace(odds=odds, is_known=False, other=other, since=time)
     else:

@@ -13,9 +13,12 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.body.whole_body import GLOBAL_DOFS, heading_column
 from shadowpuppet.camera.bits import Bits, count
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.threads import usable_cores
+from shadowpuppet.tracking.keypoints.front import CERTAIN
+from shadowpuppet.tracking.multiview.keypoint_evidence import KeypointEvidence
 from shadowpuppet.tracking.multiview.observation import Halves
 from shadowpuppet.tracking.multiview.surface.visual_hull import SurfacePoints
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
@@ -24,8 +27,11 @@ from shadowpuppet.tracking.people.evidence import (
     Division,
     Drawn,
     PersonObservation,
+    chosen_of,
     draw_person,
     ignored_pixels,
+    other_keypoints,
+    own_keypoints,
     predicted,
 )
 from shadowpuppet.tracking.people.figures import Figure
@@ -59,6 +65,8 @@ class Begun(NamedTuple):
     state: MultiviewState
     is_sided: bool
     """Whether the silhouettes tell the front from the back."""
+    is_shown: bool = False
+    """Whether keypoints do."""
 
 
 class Share(NamedTuple):
@@ -73,45 +81,60 @@ class Share(NamedTuple):
     """The body in its new pose."""
     ignored: Sequence[Bits | None] = ()
     """Pixels of each camera's picture of half the size that say nothing of this person."""
+    keypoints: Sequence[Keypoints | None] = ()
+    """This person's keypoints, one per camera; empty without any."""
 
 
 def step(people: Mapping[int, Person], points: SurfacePoints, masks: Sequence[Mask | None],
-         beside: Mapping[int, Drawn] = MappingProxyType({})) -> dict[int, Share]:
-    """The people's states after a frame's surface points and masks (H, W), one per camera, of all of them together.
+         beside: Mapping[int, Drawn] = MappingProxyType({}), keypoints: Sequence[Keypoints | None] = ()) -> dict[int, Share]:
+    """The people's states after a frame's surface points, masks (H, W) and `keypoints`, one per camera, of all of them together.
 
     Each on the evidence that the others' bodies, in their predicted poses, do not explain; people who touch once more, with all bodies as
-    found. A lost person's body explains nothing. Cores share the people: none of them depends on another's result. `beside`: other people,
-    whose poses in this frame are known.
+    found. A lost person's body explains nothing, and has keypoints that nobody else has. Cores share the people: none of them depends on
+    another's result. `beside`: other people, whose poses in this frame are known.
     """
     drawn = {n: draw_person(person.tracker, predicted(person.tracker.body, person.state)) for n, person in people.items()}
     lost, halves = {n for n, person in people.items() if person.state.status == "lost"}, Halves.of(masks)
     evidence = Division({**drawn, **beside}, lost, points, masks, halves)
 
+    def of_all(evidence: Division) -> dict[int, tuple[Keypoints | None, ...]]:
+        there, away = ({n: body for n, body in evidence.drawn.items() if (n in lost) == is_lost} for is_lost in (False, True))
+        any_body = next((person.tracker for person in people.values()), None)
+        if any_body is None:
+            return {}
+        rest = other_keypoints(any_body, there, keypoints) if away else ()
+        return own_keypoints(any_body, there, keypoints) | own_keypoints(any_body, away, rest)
+
     def follow(n: int, evidence: Division) -> tuple[MultiviewState, Drawn]:
         tracker, rng, state = people[n]
         own, ignored = evidence.of(n)
         observation = PersonObservation(tracker.views, own, masks, None, ignored, halves)
+        observation.keypoints = tracker.shown(own, masks, theirs.get(n, ()), state.pose)
         state = _judged(tracker.follow(rng, state, observation))
         return state, draw_person(tracker, state.pose)
 
+    theirs = of_all(evidence)
     with ThreadPoolExecutor(max(min(len(people), usable_cores()), 1), "people") as pool:
         found = dict(zip(people, pool.map(lambda n: follow(n, evidence), people)))
         evidence = evidence.with_bodies({n: body for n, (_, body) in found.items()})
         if close := [n for n in touching(evidence.drawn) if n in people]:
+            theirs = of_all(evidence)
             found |= dict(zip(close, pool.map(lambda n: follow(n, evidence), close)))
             evidence = evidence.with_bodies({n: found[n][1] for n in close})
         own = dict(zip(people, pool.map(evidence.share, people)))
     shares = dict[int, Share]()
     for n, (state, body) in found.items():
         own_points, own_silhouettes, ignored = own[n]
-        shares[n] = Share(state, own_points, own_silhouettes, body, ignored)
+        shares[n] = Share(state, own_points, own_silhouettes, body, ignored, theirs.get(n, ()))
     return shares
 
 
 def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, drawn: Mapping[int, Drawn], points: SurfacePoints,
-          masks: Sequence[Mask | None]) -> Begun | None:
-    """The first state of a person at the place of a figure, beside those who are `drawn`; None if there are too few points. Points
-    and masks (H, W) as in `step`."""
+          masks: Sequence[Mask | None], keypoints: Sequence[Keypoints | None] = ()) -> Begun | None:
+    """The first state of a person at the place of a figure, beside those who are `drawn`; None if there are too few points. Points,
+    masks (H, W) and `keypoints` as in `step`."""
+    if figure.people:
+        return _start_by_keypoints(person, rng, points, masks, chosen_of(keypoints, figure.people))
     mine = np.linalg.norm(points.points[:, :2] - figure.place, axis=1) < SAME_PLACE
     for other in drawn.values():
         mine &= other.distances(points.points) > 0.05
@@ -121,11 +144,26 @@ def start(person: MultiviewTracker, rng: np.random.Generator, figure: Figure, dr
     rough = person.search(rng, PersonObservation(person.views, own, [None] * len(masks)))  # the points alone: where the person is
     body = draw_person(person, rough.pose)
     observation = PersonObservation(person.views, own, masks, left_out=ignored_pixels(body, list(drawn.values()), masks))
-    found = person.search(rng, observation)  # beside others front and back hardly differ: both are tried
+    observation.keypoints = person.shown(own, masks, own_keypoints(person, {**drawn, 0: body}, keypoints).get(0, ()))
+    found = person.search(rng, observation)
+    if observation.keypoints is not None and observation.keypoints.toward(found.pose) > CERTAIN:
+        return Begun(_judged(found), is_sided=False, is_shown=True)
+    # beside others front and back hardly differ: both are tried
     other = _facing_the_other_way(person, rng, found, observation)
     best = max(found, other, key=lambda state: np.nan_to_num(state.overlap))
     share = Share(best, own, list(masks), draw_person(person, best.pose), observation.left_out)
     return Begun(_judged(best), tells_front(found.overlap, other.overlap) and shows_side(person, share))
+
+
+def _start_by_keypoints(person: MultiviewTracker, rng: np.random.Generator, points: SurfacePoints, masks: Sequence[Mask | None],
+                        keypoints: Sequence[Keypoints | None]) -> Begun | None:
+    """The first state of a person by `keypoints` of theirs alone; None if too few cameras show them."""
+    observation = PersonObservation(person.views, points, masks)
+    observation.keypoints = person.shown(points, masks, keypoints)
+    if not person.is_present(observation) or observation.keypoints is None:
+        return None
+    found = person.search(rng, observation)
+    return Begun(_judged(found), is_sided=False, is_shown=observation.keypoints.toward(found.pose) > CERTAIN)
 
 
 def tells_front(overlap: float, other: float) -> bool:
@@ -140,7 +178,7 @@ def turn_round(person: MultiviewTracker, rng: np.random.Generator, share: Share)
 
 def follow_turned(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState, share: Share) -> MultiviewState:
     """The state after one of the body turned round, from the evidence of a share."""
-    return _judged(person.cycle(rng, state, observed(person, share)))
+    return _judged(person.cycle(rng, state, observed(person, share._replace(state=state))))
 
 
 def views_apart(share: Share) -> list[int]:
@@ -163,7 +201,14 @@ def shows_side(person: MultiviewTracker, share: Share) -> bool:
 
 def observed(person: MultiviewTracker, share: Share) -> PersonObservation:
     """What a share shows of a person, as it was followed."""
-    return PersonObservation(person.views, share.points, share.masks, left_out=share.ignored)
+    observation = PersonObservation(person.views, share.points, share.masks, left_out=share.ignored)
+    observation.keypoints = shown_of(person, share)
+    return observation
+
+
+def shown_of(person: MultiviewTracker, share: Share) -> KeypointEvidence | None:
+    """What a share's keypoints say of a person; None without any."""
+    return person.shown(share.points, share.masks, share.keypoints, share.state.pose) if share.keypoints else None
 
 
 def _facing_the_other_way(person: MultiviewTracker, rng: np.random.Generator, state: MultiviewState,
@@ -211,7 +256,7 @@ def _judged(state: MultiviewState) -> MultiviewState:
     """A state with the status of a person among others: hidden by them is uncertain, and without evidence lost, not absent."""
     if state.status == "absent":
         return state._replace(status="lost", overlap=0.0)
-    return state._replace(status="uncertain", overlap=0.0) if np.isnan(state.overlap) else state
+    return state._replace(status="uncertain", overlap=0.0) if np.isnan(state.agreement) else state
 
 
 def place_of(body: Body, state: MultiviewState) -> Array:
