@@ -14,6 +14,7 @@ import pytest
 from benchmarks.detector import Detector, detected
 from shadowpuppet.errors import RecordingError, ShadowPuppetWarning, TrackingError
 from shadowpuppet.io.keypoints.film_keypoints import film_keypoints, write_keypoints
+from shadowpuppet.io.person import Person, write_person
 from shadowpuppet.io.run import read_run
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.prepare import look_at
@@ -69,10 +70,15 @@ def test_several_cameras_follow_a_person_without_an_empty_scene(walk, tmp_path):
 BODY_THIGH = float(np.linalg.norm(np.diff(BODY.points(POSES[:1], names=["left_hip", "left_knee"])[0], axis=0)))
 
 
-def test_one_camera_follows_a_person_given_the_height(walk, tmp_path):
-    options = make_options(BY_KEYPOINTS | {"camera": "cam1", "height": 1.75})
-    found = track_recording(walk, tmp_path / "run", options).motion
-    assert np.median(errors(found)) < 0.15
+@pytest.mark.parametrize("known", ["sizes", "height"])
+def test_one_camera_follows_a_person_given_the_sizes_or_the_height(walk, tmp_path, known):
+    write_person(tmp_path / "person.toml", Person(actor.sizes(), 1.75, "the actor's own"))
+    given = {"person": str(tmp_path / "person.toml")} if known == "sizes" else {"height": 1.75}
+    found = track_recording(walk, tmp_path / "run", make_options(BY_KEYPOINTS | {"camera": "cam1"} | given)).motion
+    if known == "sizes":
+        assert np.median(errors(found)) < 0.15
+    within = np.abs(found.joints - BODY.points(POSES, names=found.joint_names)) < 1.645 * found.joint_sd
+    assert within.mean() > 0.8
     across = made_rig.cameras()[0].project(found.joints) - made_rig.cameras()[0].project(BODY.points(POSES, names=found.joint_names))
     assert np.median(np.linalg.norm(across, axis=2)) < 3  # of 160 pixels
     assert read_run(tmp_path / "run").info["cameras"] == ["cam1"]

@@ -84,12 +84,13 @@ def ranked(findings: Iterable[Finding]) -> list[Finding]:
 def verdict_of(findings: Iterable[Finding], in_depth: Sequence[Finding] = ()) -> Verdict:
     """The verdict that findings lead to: bad with a ruinous one, doubtful with a harmful one, else good; and those about depth alone."""
     findings = list(findings)
-    word, depth = (_word(max((each.severity for each in some), default=0)) for some in (findings, [*findings, *in_depth]))
+    word, depth = _word(findings), _word([*findings, *in_depth])
     reasons = tuple(dict.fromkeys(each.short for each in ranked([*findings, *in_depth])))[:MOST]
     return Verdict(word, reasons, depth if depth != word else None)
 
 
-def _word(severity: int) -> Word:
+def _word(findings: Sequence[Finding]) -> Word:
+    severity = max((each.severity for each in findings), default=0)
     return "bad" if severity >= RUINOUS else "doubtful" if severity >= HARMFUL else "good"
 
 
