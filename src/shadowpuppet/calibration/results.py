@@ -24,10 +24,7 @@ def write_results(found: Calibrated, path: Path, page: Callable[[Calibrated], st
     written = replace_calibration(path, found.cameras)
     if page is not None:
         beside = path.with_suffix(".html")
-        try:
-            write_whole(beside, page(found))
-        except OSError as error:
-            raise CalibrationError(f"{beside}: cannot be written ({reason(error)})") from None
+        write_whole(beside, page(found))
         written.append(beside)
     return written
 

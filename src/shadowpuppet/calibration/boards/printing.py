@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from shadowpuppet.calibration.boards.board import Board, check_turned
-from shadowpuppet.errors import CalibrationError, reason
+from shadowpuppet.errors import CalibrationError
 from shadowpuppet.io.files.text import write_whole
 
 POINTS_PER_METRE = 72 / 0.0254
@@ -27,10 +27,7 @@ def write_board(path: Path, board: Board) -> str:
     if path.suffix.lower() != ".pdf":
         raise CalibrationError(f"{path}: found the ending {path.suffix!r}, expected .pdf")
     name, width, height = sheet_of(board)
-    try:
-        write_whole(path, board_pdf(board, width, height))
-    except OSError as error:
-        raise CalibrationError(f"{path}: cannot be written ({reason(error)})") from None
+    write_whole(path, board_pdf(board, width, height))
     return name
 
 

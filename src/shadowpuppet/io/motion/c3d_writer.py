@@ -18,16 +18,12 @@ from shadowpuppet.motion.contact.contact import FootEvent
 from shadowpuppet.motion.interpolation import resample, uniform_sampling
 from shadowpuppet.motion.motion import JointTable
 
-MM = 1000.0
-"""Millimetres, the file's unit, per metre."""
 MAX_BLOCKS, MAX_NAMES, MAX_LETTERS = 255, 255, 120
 """The format's limits: blocks of parameters, names in a list, letters of a name."""
 MAX_FRAME = 2**31
 """Greatest number of a frame."""
 MAX_RESIDUAL = 255
 """Greatest residual, millimetres: a byte in the format's integer files."""
-UNKNOWN_RESIDUAL = -1.0
-"""Marks an unknown position."""
 EVENTS = {True: "Foot Strike", False: "Foot Off"}
 """Events of a foot, in the words of Vicon's programs."""
 Parameter = tuple[str, int, Sequence[int], bytes]
@@ -91,10 +87,10 @@ def _at_constant_rate(path: Path, times: Array, values: Array) -> tuple[float, A
 
 
 def _points(places: Array, deviations: Array) -> Array:
-    """Positions (T, J, 3) with their residuals, (T, J, 4), in the file's unit."""
+    """Positions (T, J, 3) with their residuals, (T, J, 4), millimetres; -1 for unknown positions."""
     known: NDArray[np.bool_] = np.asarray(np.isfinite(places).all(2))
-    residuals = np.where(np.isfinite(deviations), np.round(np.minimum(MM * np.nan_to_num(deviations), MAX_RESIDUAL)), 0.0)
-    return np.concatenate([np.where(known[..., None], MM * places, 0.0), np.where(known, residuals, UNKNOWN_RESIDUAL)[..., None]], 2)
+    residuals = np.where(np.isfinite(deviations), np.round(np.minimum(1000 * np.nan_to_num(deviations), MAX_RESIDUAL)), 0.0)
+    return np.concatenate([np.where(known[..., None], 1000 * places, 0.0), np.where(known, residuals, -1.0)[..., None]], 2)
 
 
 def _header(points: int, analog: int, frames: tuple[int, int], start: int, rate: float) -> bytes:
