@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from scipy.constants import inch
+
 from shadowpuppet.calibration.boards.board import Board, check_turned
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.io.files.text import write_whole
 
-POINTS_PER_METRE = 72 / 0.0254
+POINTS_PER_METRE = 72 / inch
 PAPERS = {"A4": (0.210, 0.297), "A3": (0.297, 0.420), "A2": (0.420, 0.594), "A1": (0.594, 0.841), "A0": (0.841, 1.189)}
 """Widths and heights of sheets, metres."""
 MARGIN = 0.012

@@ -12,10 +12,8 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.evaluation.report.html import document, figure, plain, rows, table
 from shadowpuppet.geometry import Array, evenly_spread
 
-MOST_DOTS = 1500
-"""Greatest number of corners drawn of a camera."""
-MAP_WIDTH, PICTURE_WIDTH = 520, 340
-"""Widths of the drawings, pixels."""
+PICTURE_WIDTH = 340
+"""Width of a camera's drawing, pixels."""
 ARROW_SCALE = 40.0
 """Factor by which reprojection errors are drawn larger than they are."""
 
@@ -83,7 +81,7 @@ def _picture(fit: LensFit) -> str:
     """Corners and errors over the picture's frame, as SVG."""
     width, height = fit.camera.size
     k = PICTURE_WIDTH / width
-    chosen = evenly_spread(len(fit.corners), MOST_DOTS)
+    chosen = evenly_spread(len(fit.corners), 1500)
     ends = fit.corners + ARROW_SCALE * fit.residuals
     marks = "".join(f"M{k * a:.1f} {k * b:.1f}L{k * c:.1f} {k * d:.1f}" for (a, b), (c, d) in zip(fit.corners[chosen], ends[chosen]))
     dots = "".join(f'<circle cx="{k * a:.1f}" cy="{k * b:.1f}" r="1.1"/>' for a, b in fit.corners[chosen])
@@ -99,7 +97,7 @@ def _map(found: Calibrated) -> str:
     places = np.array([camera.centre[:2] for camera in found.cameras])
     points = np.concatenate([boards, places])
     low, high = points.min(0) - 0.8, points.max(0) + 0.8
-    k = MAP_WIDTH / max(float((high - low).max()), 1e-6)
+    k = 520 / max(float((high - low).max()), 1e-6)  # pixels a metre
 
     def at(point: Array) -> tuple[float, float]:
         return k * float(point[0] - low[0]), k * float(high[1] - point[1])
