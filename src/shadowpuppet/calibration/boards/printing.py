@@ -23,8 +23,8 @@ RULER = 0.1
 
 
 def write_board(path: Path, board: Board) -> str:
-    """Write the board as a PDF of true size; returns the sheet's name. Raises `CalibrationError` if it cannot be written, or looks the same
-    after half a turn."""
+    """Write the board as a PDF of true size; returns the sheet's name. Raises `ShadowPuppetError` if it cannot be written, or looks the
+    same after half a turn."""
     check_turned(board)
     if path.suffix.lower() != ".pdf":
         raise CalibrationError(f"{path}: found the ending {path.suffix!r}, expected .pdf")
