@@ -12,8 +12,8 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.evaluation.report.html import document, figure, plain, rows, table
 from shadowpuppet.geometry import Array, evenly_spread
 
-PICTURE_WIDTH = 340
-"""Width of a camera's drawing, pixels."""
+MAP_WIDTH, PICTURE_WIDTH = 520, 340
+"""Widths of the drawings, pixels."""
 ARROW_SCALE = 40.0
 """Factor by which reprojection errors are drawn larger than they are."""
 
@@ -97,7 +97,7 @@ def _map(found: Calibrated) -> str:
     places = np.array([camera.centre[:2] for camera in found.cameras])
     points = np.concatenate([boards, places])
     low, high = points.min(0) - 0.8, points.max(0) + 0.8
-    k = 520 / max(float((high - low).max()), 1e-6)  # pixels a metre
+    k = MAP_WIDTH / max(float((high - low).max()), 1e-6)
 
     def at(point: Array) -> tuple[float, float]:
         return k * float(point[0] - low[0]), k * float(high[1] - point[1])
