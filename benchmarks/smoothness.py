@@ -21,7 +21,7 @@ from multiview import made as made_rings
 from proving_ground import HERE as GROUND
 from proving_ground import made as made_ground
 
-from shadowpuppet.evaluation.exchanges import exchanges
+from shadowpuppet.evaluation.error_metrics import exchanges
 from shadowpuppet.io.intervals import HALF_WIDTH
 from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.motion.table import read_raw

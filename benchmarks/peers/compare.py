@@ -42,7 +42,7 @@ from triangulation import LANDMARKS, SEEN, one_camera, several_cameras  # noqa: 
 from shadowpuppet.external.environment import command_for, variables  # noqa: E402
 from shadowpuppet.external.script import read_script  # noqa: E402
 from shadowpuppet.geometry import Array, align  # noqa: E402
-from shadowpuppet.io.files.npz import read_members  # noqa: E402
+from shadowpuppet.io.files.npz import read_arrays  # noqa: E402
 from shadowpuppet.io.motion.motion_files import read_truth  # noqa: E402
 from shadowpuppet.io.recording import read_recording  # noqa: E402
 from shadowpuppet.motion.limbs import limb_of  # noqa: E402
@@ -113,7 +113,7 @@ def landmarks(case: Case, folder: Path, again: bool) -> dict[str, Array]:
         films = [f"{view.camera.name}={Path(str(view.video)).resolve()}" for view in read_recording(case.path).views]
         command = command_for(read_script(SCRIPT, SCRIPT.name), partial(print, flush=True))
         subprocess.run([*command, str(file), *films], env=variables(), check=True, stderr=subprocess.DEVNULL)
-    return read_members(file)
+    return read_arrays(file)
 
 
 def theirs(case: Case, found: dict[str, Array]) -> tuple[JointTable, Array, float]:

@@ -32,6 +32,14 @@ def rotation_from_vector(vector: ArrayLike) -> Array:
     return np.eye(3) if angle == 0 else rotation_about(vector / angle, angle)
 
 
+def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
+    """Rotation matrix (3, 3) of a unit quaternion x, y, z, w."""
+    x, y, z, w = np.asarray(quaternion, float)
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+
+
 def vector_from_rotation(R: ArrayLike) -> Array:
     """Rotation vector (3,), radians, at most pi long, of a rotation matrix (3, 3); the inverse of `rotation_from_vector`. Uses the
     best-fitting quaternion (Bar-Itzhack 2000), which stays exact near half a turn, where sines vanish."""

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.constants import day
 
-from shadowpuppet.calibration.clock_offset import DAY, timecode_offsets
+from shadowpuppet.calibration.clock_offset import timecode_offsets
 
 NAMES = ("a", "b", "c")
 
@@ -35,8 +36,8 @@ def test_what_tells_nothing_is_none(codes):
     assert offsets(codes) is None
 
 
-@given(st.lists(st.floats(0, 600), min_size=3, max_size=3), st.floats(0, DAY))
+@given(st.lists(st.floats(0, 600), min_size=3, max_size=3), st.floats(0, day))
 def test_midnight_changes_nothing(begins, at):
-    if len({(at + begin) % DAY for begin in begins}) < 3 or len({*begins}) < 3:
+    if len({(at + begin) % day for begin in begins}) < 3 or len({*begins}) < 3:
         return
-    np.testing.assert_allclose(offsets([(at + begin) % DAY for begin in begins]).seconds, offsets(begins).seconds, atol=1e-6)
+    np.testing.assert_allclose(offsets([(at + begin) % day for begin in begins]).seconds, offsets(begins).seconds, atol=1e-6)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from shadowpuppet.calibration.clock_offset import QUANTILE
 from shadowpuppet.calibration.silhouettes import silhouettes_of
 from shadowpuppet.calibration.time_offset import _compared, _linked, _Shift, _solved, time_offsets
+from shadowpuppet.io.intervals import HALF_WIDTH
 
 LATE = (0.0, 4.0, -2.0, 1.0)
 
@@ -101,7 +101,7 @@ def test_intervals_of_shifts_hold_what_is_true():
         both = np.stack([np.interp(x - shift, np.arange(300), motion) for shift in (0.0, late)])
         found = _compared(0, 1, both + np.stack([wandering(rng, 240, 1.5, 1.0), wandering(rng, 240, 1.5, 1.0)]), 120)
         assert found is not None
-        held.append(abs(found.sets - late) <= QUANTILE * np.sqrt(found.variance))
+        held.append(abs(found.sets - late) <= HALF_WIDTH * np.sqrt(found.variance))
     assert 0.78 <= np.mean(held) <= 0.99
 
 

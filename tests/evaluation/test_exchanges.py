@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shadowpuppet.evaluation.exchanges import exchanges
+from shadowpuppet.evaluation.error_metrics import exchanges
 from shadowpuppet.evaluation.summary_text import exchanges_text
 from shadowpuppet.motion.motion import JointTable
 

@@ -27,7 +27,7 @@ from shadowpuppet.motion.inverse_kinematics import (
 )
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.motion.plausibility import NEEDED_JOINTS
-from shadowpuppet.motion.prior.clips import mirrored
+from shadowpuppet.motion.prior.training import mirrored
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 
 LIMBS = [f"{side}_{name}" for side in ("left", "right") for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")]

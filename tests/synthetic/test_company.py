@@ -12,7 +12,7 @@ from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.recording import read_recording
 from shadowpuppet.synthetic import Bystander, Gesture, Ring, Scene, Spec
 from shadowpuppet.synthetic.company import members
-from shadowpuppet.synthetic.movement.gestures import LEAD_SECONDS, shake_hands
+from shadowpuppet.synthetic.movement.gestures import PAUSE_SECONDS, shake_hands
 from shadowpuppet.synthetic.person.mannequin import JOINTS
 from shadowpuppet.synthetic.recording import _bystander, perform, synthesize
 from shadowpuppet.synthetic.spec_changes import SpecChanges, apply_changes
@@ -49,7 +49,7 @@ def test_hands_meet():
 def test_a_handshake_is_in_order_of_time(seconds):
     times = [time for time, _ in shake_hands(seconds, np.random.default_rng(1))]
     assert times == sorted(times)
-    assert times[-1] <= seconds + LEAD_SECONDS
+    assert times[-1] <= seconds + PAUSE_SECONDS
 
 
 def test_the_first_person_is_at_the_origin():

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
+from scipy.constants import day
 
-DAY = 86400.0
-"""Seconds after which timecodes begin again."""
-QUANTILE = 1.645
-"""Half-width of a 90 % interval over the standard deviation."""
+from shadowpuppet.io.intervals import HALF_WIDTH
+
 LEAST_RESIDUAL = 0.002
 """Seconds below which the residual of a pair's offset does not count."""
 
@@ -50,7 +49,7 @@ def timecode_offsets(names: Sequence[str], timecodes: Sequence[float | None], st
     if len(set(known)) < 2:
         return None
     first = known[0]
-    turned = [None if code is None else (code - first + DAY / 2) % DAY - DAY / 2 for code in timecodes]  # films over midnight
+    turned = [None if code is None else (code - first + day / 2) % day - day / 2 for code in timecodes]  # films over midnight
     late = [None if code is None else -code - start for code, start in zip(turned, starts)]
     middle = float(np.median([each for each in late if each is not None]))
     return ClockOffsets(by="timecode", names=tuple(names), seconds=tuple(None if each is None else each - middle for each in late),
@@ -85,5 +84,5 @@ def offsets_of_pairs(names: Sequence[str], pairs: Sequence[PairOffset]) -> Clock
     for film in stated:
         own = [n for n, pair in enumerate(pairs) if film in (pair.first, pair.second)]
         deviation = np.hypot(np.median([pairs[n].deviation for n in own]), np.median(off[own]))
-        seconds[film], spread[film] = round(float(late[film]), 4), round(QUANTILE * float(deviation), 4)
+        seconds[film], spread[film] = round(float(late[film]), 4), round(HALF_WIDTH * float(deviation), 4)
     return ClockOffsets(by="sound", names=tuple(names), seconds=tuple(seconds), spread=tuple(spread))

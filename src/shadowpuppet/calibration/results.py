@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import count
 from pathlib import Path
 
 from shadowpuppet.calibration.session import Calibrated
@@ -11,23 +12,17 @@ from shadowpuppet.errors import CalibrationError, reason
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.files.text import write_whole
 
-MOST_KEPT = 1000
-"""Greatest number of old files of one name that are kept."""
-
 
 def write_results(found: Calibrated, path: Path, page: Callable[[Calibrated], str] | None) -> list[Path]:
     """Write the calibration to `path` (.toml), and what `page` makes of it beside it (.html); returns the files written. A calibration
-    that is there is kept under another name. Raises `CalibrationError` if a file cannot be written."""
+    that is there is kept under another name. Raises `ShadowPuppetError` if a file cannot be written."""
     if path.suffix.lower() != ".toml":
         raise CalibrationError(f"{path}: found the ending {path.suffix!r}, expected .toml; `shadowpuppet info FILE --to` writes other "
                                "formats")
     written = replace_calibration(path, found.cameras)
     if page is not None:
         beside = path.with_suffix(".html")
-        try:
-            write_whole(beside, page(found))
-        except OSError as error:
-            raise CalibrationError(f"{beside}: cannot be written ({reason(error)})") from None
+        write_whole(beside, page(found))
         written.append(beside)
     return written
 
@@ -44,10 +39,8 @@ def keep_old(path: Path) -> Path | None:
     `CalibrationError`."""
     if not path.exists():
         return None
-    places = (path.with_name(f"{path.stem}.before{n}{path.suffix}") for n in range(1, MOST_KEPT))
-    place = next((place for place in places if not place.exists()), None)
-    if place is None:
-        raise CalibrationError(f"{path}: {MOST_KEPT - 1} older files of this name are kept already; remove some")
+    places = (path.with_name(f"{path.stem}.before{n}{path.suffix}") for n in count(1))
+    place = next(place for place in places if not place.exists())
     try:
         write_whole(place, path.read_bytes())
     except OSError as error:

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shadowpuppet.calibration.clock_offset import QUANTILE
 from shadowpuppet.calibration.silhouettes import Row
 from shadowpuppet.calibration.solve.tangency_bundle import hulls_of, pairs_of, place_by_outlines, signed_distances
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
+from shadowpuppet.io.intervals import HALF_WIDTH
 
 PUSHED_ANGLE, PUSHED_PLACE = np.radians(10.0), 0.15
 """Standard deviations of a pushed tripod's rotation (rad) and displacement (m) along each axis."""
@@ -132,7 +132,7 @@ def estimate_place_error(cameras: Sequence[Camera], rows: Sequence[Row], n: int)
         return None
     before, now = cameras[n], fit.cameras[n]
     turn = vector_from_rotation(now.T_camera_world[:3, :3] @ before.T_camera_world[:3, :3].T)
-    return _error_of(turn, now.centre - before.centre, fit.before[n], fit.after[n], QUANTILE * PUSHED_FACTOR * fit.turn_sd[n])
+    return _error_of(turn, now.centre - before.centre, fit.before[n], fit.after[n], HALF_WIDTH * PUSHED_FACTOR * fit.turn_sd[n])
 
 
 def _error_of(turn: Array, moved: Array, before: float, after: float, widths: Array) -> RotationError:

@@ -9,8 +9,6 @@ from typing import Annotated, Any
 from shadowpuppet.cli.flags import AsJson, Quiet, Switch, flag, output, switch
 from shadowpuppet.cli.tables import error_table, metrics_table, pairs, people_table, show, show_json, table
 
-DOFS_IN_ROW = 2
-
 
 def evaluate(run: Path, truth: Path | None = None, /, *, joints: str | None = None, start: str = "0", end: str | None = None,
              offset: float = 0.0, sync: Switch = False, align: Switch = False, angles: Switch = False,
@@ -165,5 +163,5 @@ def _rows(measured: Mapping[str, Any]) -> Iterator[tuple[str, str | list[str]]]:
     yield "intervals", coverage_text(measured["coverage"])
     if "dofs_deg" in measured:
         dofs = [f"{name} {value['rmse']:.1f}" for name, value in measured["dofs_deg"].items()]
-        lines = [", ".join(dofs[n : n + DOFS_IN_ROW]) for n in range(0, len(dofs), DOFS_IN_ROW)]
+        lines = [", ".join(dofs[n : n + 2]) for n in range(0, len(dofs), 2)]
         yield "angles", [*lines, "(rmse, degrees)"]

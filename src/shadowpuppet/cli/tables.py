@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 SENSES = {"uncertain": " (the outline fits badly)", "predicted": " (bridged or unseen)", "lost": " (nothing fits)",
           "absent": " (nobody in the picture)"}
 """Meaning of a frame's status, beside it in a table; `tracked` needs no words."""
-ANY_WIDTH = 10_000
-"""Columns that are more than any table needs."""
 
 
 class PlainConsole(Console):
@@ -61,7 +59,7 @@ def _least_width(console: Console, part: RenderableType) -> int:
         return max((_least_width(console, each) for each in part.renderables), default=0)
     if not isinstance(part, Table) or not all(column.no_wrap for column in part.columns):
         return 0
-    return Measurement.get(console, console.options.update(max_width=ANY_WIDTH), part).maximum
+    return Measurement.get(console, console.options.update(max_width=10_000), part).maximum
 
 
 def show_next(*commands: str) -> None:

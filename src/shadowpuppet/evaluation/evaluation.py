@@ -16,12 +16,12 @@ from shadowpuppet.evaluation.error_metrics import (
     aligned_errors,
     axis_errors,
     bone_errors,
+    exchanges,
     hinge_errors,
     pose_losses,
     whole_alignment,
     world_difference,
 )
-from shadowpuppet.evaluation.exchanges import exchanges
 from shadowpuppet.evaluation.interval_coverage import coverage
 from shadowpuppet.evaluation.joint_angles import compared_poses, dof_errors, turn_errors
 from shadowpuppet.evaluation.movement.movement import gait_summary

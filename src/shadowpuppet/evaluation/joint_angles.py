@@ -15,8 +15,6 @@ from shadowpuppet.motion.synchronization import match
 UNOBSERVABLE = ("head", "_ankle")
 """Endings of the names of joints whose rotation is not determined by the joints' positions."""
 
-ALIGNMENTS = 50
-"""Rounds in which both constant turns are found."""
 
 
 def compared_poses(motion: Motion, truth: JointTable, start: int = 0) -> tuple[Skeleton, Array, Array]:
@@ -65,9 +63,9 @@ def dof_errors(skeleton: Skeleton, ours: Array, theirs: Array) -> dict[str, dict
 
 
 def frame_aligned(ours: Array, theirs: Array) -> Array:
-    """Rotations (N, 3, 3) between two constant ones that bring them nearest to others (N, 3, 3); the two are found in turn."""
+    """Rotations (N, 3, 3) between two constant ones that bring them nearest to others (N, 3, 3); the two are found in turn, 50 times."""
     above, below = np.eye(3), np.eye(3)
-    for _ in range(ALIGNMENTS):
+    for _ in range(50):
         below = _nearest_rotation((ours.swapaxes(1, 2) @ above.T @ theirs).sum(0))
         above = _nearest_rotation((theirs @ (ours @ below).swapaxes(1, 2)).sum(0))
     return above @ ours @ below

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.conventions import Convention, conventions
 from shadowpuppet.body.models import MODELS, average_sizes, make_body
 from shadowpuppet.io.files.text import write_whole
 
-HEIGHT = 1.75
-"""Of the person (m) whose body is asked: conventions do not depend on sizes."""
 ABOUT = {
     "frame": "x forward, y to the person's left, z up; every joint's axes are parallel to these when all angles are zero",
     "sequence": "angles of a joint act by their order, each about its axis as those before have turned it; components of a rotation vector "
@@ -29,7 +28,7 @@ def write_angles(path: str | Path, body_name: str, dof_names: Sequence[str]) -> 
 
     if body_name not in MODELS:
         return False
-    body = make_body(body_name, average_sizes(body_name, HEIGHT))
+    body = make_body(body_name, average_sizes(body_name, AVERAGE_HEIGHT))  # conventions do not depend on sizes
     if tuple(dof_names) != body.skeleton.dof_names:
         return False
     write_whole(Path(path), tomli_w.dumps({"body": body_name} | ABOUT | {each.dof.name: _entry(each) for each in conventions(body)}))

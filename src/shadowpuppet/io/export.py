@@ -8,6 +8,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from scipy.constants import inch
 
 from shadowpuppet.errors import FormatError, SettingsError, ShadowPuppetError, choices, reason, warn
 from shadowpuppet.io.export_formats import FORMATS, ExportFormat, Layout, Puppet, RunExport
@@ -26,7 +27,7 @@ from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.mesh import body_mesh, bone_mesh
 from shadowpuppet.motion.motion import JointTable
 
-BVH_UNITS = {**METRES, "in": 0.0254}
+BVH_UNITS = {**METRES, "in": inch}
 """Units of length that a BVH file may have, in metres."""
 
 

@@ -15,7 +15,7 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import FormatError, SettingsError, choices, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.bvh_writer import write_bvh
-from shadowpuppet.io.motion.c3d_writer import MAX_RESIDUAL, MM, write_c3d
+from shadowpuppet.io.motion.c3d_writer import MAX_BYTE, write_c3d
 from shadowpuppet.io.motion.characters.bone_names import bone_names, with_bone_names
 from shadowpuppet.io.motion.characters.usd import write_usda
 from shadowpuppet.io.motion.glb import write_glb
@@ -139,7 +139,7 @@ class RunExport:
         that a C3D file holds, so that programs which drop points of large residuals drop them."""
         motion = self.run.motion
         doubtful = np.isin(motion.limb_status, DOUBTFUL)[:, [motion.limbs.index(limb_of(name)) for name in motion.joint_names]]
-        return np.where(doubtful, MAX_RESIDUAL / MM, np.sqrt((motion.joint_sd**2).mean(2)))
+        return np.where(doubtful, MAX_BYTE / 1000, np.sqrt((motion.joint_sd**2).mean(2)))
 
     @property
     def smoothing(self) -> str:

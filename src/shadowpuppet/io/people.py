@@ -66,15 +66,13 @@ def read_places(folder: str | Path) -> dict[int, tuple[Array, list[str], Array]]
     return {int(n): (times[people == n], status[people == n].tolist(), places[people == n]) for n in np.unique(people)}
 
 
-def remove_people(folder: Path, names: tuple[str, ...], kept: int = 0) -> None:
-    """Remove the files `names` of earlier runs of people with a number above `kept`, and people.csv if none is kept."""
-    for number, own in person_folders(folder).items():
-        if number > kept:
-            for name in names:
-                with contextlib.suppress(OSError):
-                    (own / name).unlink(missing_ok=True)
+def remove_people(folder: Path, names: tuple[str, ...]) -> None:
+    """Remove the files `names` of earlier runs of people, and people.csv."""
+    for own in person_folders(folder).values():
+        for name in names:
             with contextlib.suppress(OSError):
-                own.rmdir()
-    if not kept:
+                (own / name).unlink(missing_ok=True)
         with contextlib.suppress(OSError):
-            (folder / PEOPLE).unlink(missing_ok=True)
+            own.rmdir()
+    with contextlib.suppress(OSError):
+        (folder / PEOPLE).unlink(missing_ok=True)

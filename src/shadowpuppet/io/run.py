@@ -26,7 +26,7 @@ import numpy as np
 
 from shadowpuppet.errors import FormatError, shown, typed
 from shadowpuppet.io.files.table import Table, read_table
-from shadowpuppet.io.files.text import errors_named, read_limited, read_toml
+from shadowpuppet.io.files.text import JSON_LIMIT, errors_named, read_limited, read_toml
 from shadowpuppet.io.motion.npz import read_motion_npz
 from shadowpuppet.io.motion.table import read_raw, read_run_tables
 from shadowpuppet.io.people import person_folders
@@ -36,8 +36,6 @@ TABLES = ("joints.csv", "angles.csv", "intervals.csv")
 RAW = "raw.csv"
 CONTACTS = "contacts.csv"
 ANGLES = "angles.toml"
-METRICS_LIMIT = 50_000_000
-"""Greatest size of metrics.json, bytes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +127,7 @@ def _read_metrics(path: Path) -> dict[str, Any]:
     if not path.exists():
         return {}
     try:
-        data = json.loads(read_limited(path, METRICS_LIMIT, FormatError, "a JSON file"))
+        data = json.loads(read_limited(path, JSON_LIMIT, FormatError, "a JSON file"))
     except (ValueError, RecursionError) as error:
         raise FormatError(f"{path}: not valid JSON: {error}") from None
     if not isinstance(data, dict):

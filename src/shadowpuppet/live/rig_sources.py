@@ -18,7 +18,7 @@ from shadowpuppet.live.base_session import Pictures
 from shadowpuppet.live.phases import KEPT
 from shadowpuppet.live.rig_capture import RigCapture, SnapshotSet
 from shadowpuppet.live.settings import LiveSettings
-from shadowpuppet.pipeline.footage import Footage, camera_footage, cut
+from shadowpuppet.pipeline.footage import Footage, camera_footage, cut, names_in
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig, open_rig, synchronized_frames
 from shadowpuppet.silhouette.background import sample_frames
@@ -49,13 +49,13 @@ class RigSources(NamedTuple):
 def is_rig(source: str) -> bool:
     """Whether a source stands for several cameras: names separated by commas, or the folder of a recording."""
     path = Path(source)
-    return (path / "video").is_dir() if path.exists() else len(_parts(source)) > 1
+    return (path / "video").is_dir() if path.exists() else len(names_in(source)) > 1
 
 
 def sources_of(source: str) -> tuple[Path, ...]:
     """The films and folders that a source names, or the recording; none for cameras and streams."""
     path = Path(source)
-    return (path,) if os.path.exists(path) else tuple(Path(part) for part in _parts(source) if os.path.exists(part))
+    return (path,) if os.path.exists(path) else tuple(Path(part) for part in names_in(source) if os.path.exists(part))
 
 
 def open_rig_sources(options: Options, settings: LiveSettings) -> RigSources:
@@ -64,7 +64,7 @@ def open_rig_sources(options: Options, settings: LiveSettings) -> RigSources:
         raise SettingsError(f"{'region' if options.region else 'background'}: found one for several cameras, expected none")
     if Path(settings.camera).is_dir():
         return _films(_recorded(settings.camera, options), options, settings)
-    names = _parts(settings.camera)
+    names = names_in(settings.camera)
     cameras = _calibrated(options, len(names))
     if any(name.isdecimal() or ADDRESS.match(name) for name in names):
         feeds = [open_feed(name, rate=settings.rate, speed=settings.speed, start=options.start, end=options.end) for name in names]
@@ -74,10 +74,6 @@ def open_rig_sources(options: Options, settings: LiveSettings) -> RigSources:
         _check_size(view.camera, open_frames(view.video).size)
     recording = cut(recording, options)
     return _films(Rig(recording, tuple(camera_footage(recording, view, options) for view in recording.views)), options, settings)
-
-
-def _parts(source: str) -> list[str]:
-    return [part.strip() for part in source.split(",")]
 
 
 def _recorded(folder: str, options: Options) -> Rig:

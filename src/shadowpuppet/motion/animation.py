@@ -16,7 +16,7 @@ from shadowpuppet.motion.motion import JointTable
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
 """From our world (Z up) to the world of files with Y up: (x, z, -y), which Blender and OpenSim undo. X stays."""
 SAME_PLACE = 1e-9
-"""Largest change of position (m) of a joint that does not move."""
+"""Largest distance (m) of two positions that count as equal."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,13 +11,11 @@ from shadowpuppet.body.shapes import Body, Quads
 from shadowpuppet.body.whole_body import Three
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array, align
-from shadowpuppet.motion.animation import Animation
+from shadowpuppet.motion.animation import SAME_PLACE, Animation
 from shadowpuppet.motion.motion import Motion
 
 TO_REST = np.array([[0.0, 1, 0], [0, 0, 1.0], [1.0, 0, 0]])
 """From a body's axes (forward, left, up) to those of skeletons at rest (left, up, forward)."""
-SAME_POINT = 1e-9
-"""Largest distance (m) of two positions that count as equal."""
 JOINT_TOLERANCE = 1e-4
 """Largest distance (m) of a run's joints from its body's with one transform for all frames."""
 MIN_END = 0.01
@@ -120,12 +118,12 @@ class BodyTree:
 
     def _joint_at(self, joint: int, place: Three) -> int | None:
         """The joint that coincides with a position in a joint's frame in every pose, if there is one."""
-        if np.linalg.norm(place) < SAME_POINT:
+        if np.linalg.norm(place) < SAME_PLACE:
             return joint
         skeleton = self.body.skeleton
         moved = {coupling.joint for coupling in skeleton.couplings} | {dof.joint for dof in skeleton.dofs if dof.kind == "translation"}
         for j, other in enumerate(skeleton.joints):
-            near = np.abs(np.subtract(other.offset, place)).max() < SAME_POINT
+            near = np.abs(np.subtract(other.offset, place)).max() < SAME_PLACE
             if near and other.parent == skeleton.joints[joint].name and other.name not in moved:
                 return j
         return None
@@ -155,7 +153,7 @@ class BodyTree:
             return (0.0, 0.0, -MIN_END)
         centres, radii = centres[own], radii[own]
         toward = start if leaf.place is not None else centres[np.linalg.norm(centres, axis=1).argmax()]
-        along = toward / max(float(np.linalg.norm(toward)), SAME_POINT)
+        along = toward / max(float(np.linalg.norm(toward)), SAME_PLACE)
         reach = (centres @ along + np.sqrt(((radii * along) ** 2).sum(1))).max() - start @ along
         x, y, z = (max(float(reach), MIN_END) * along).tolist()
         return (x, y, z)

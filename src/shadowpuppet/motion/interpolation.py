@@ -19,8 +19,6 @@ ROUNDED_TIME = 1e-9
 """Greatest error of a number for a time, seconds."""
 MOST_ROUNDED = 0.02
 """Greatest share by which a fitted rate may differ from the nominal one: two times of a film rounded to milliseconds have 1%."""
-SINGLE_FRAME_RATE = 30.0
-"""Rate (frames/s) of a single frame."""
 
 
 class UniformSampling(NamedTuple):
@@ -41,7 +39,7 @@ def uniform_sampling(times: ArrayLike) -> UniformSampling:
     if len(times) < 2:
         if not len(times):
             raise ShadowPuppetError("found no frame, expected one at least")
-        return UniformSampling(SINGLE_FRAME_RATE, times, np.zeros(1, np.int64))
+        return UniformSampling(30.0, times, np.zeros(1, np.int64))  # any rate is right for a single frame
     steps = np.diff(times)
     step = float(np.median(steps))
     if (times[-1] - times[0]) / step > MAX_FRAMES:

@@ -6,9 +6,6 @@ import numpy as np
 
 from shadowpuppet.jit import compiled
 
-NEUTRAL = 128.0
-"""Cr and Cb of a grey pixel, 8 bit."""
-
 
 @compiled(nogil=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
 def classify(planes, within, mean, inverse_sigma, keyed, shadowed, darkest, asked, weak, strong, label):
@@ -19,7 +16,7 @@ def classify(planes, within, mean, inverse_sigma, keyed, shadowed, darkest, aske
     match the background darkened to a share of at least `darkest` (1: no darkening); such a pixel gets label 3 instead of 0 if it has
     less than `asked` of the background's brightness.
     """
-    weak, strong, centre = weak * weak, strong * strong, np.float32(NEUTRAL)
+    weak, strong, centre = weak * weak, strong * strong, np.float32(128)  # Cr and Cb of a grey pixel
     for y in range(planes.shape[0]):
         for x in range(planes.shape[1]):
             if within[y, x]:

@@ -1,6 +1,6 @@
 """Kernels of `PersonRenderer`: sphere tracing of the blended lofts (Hart 1996).
 
-`placed` (P, PLACED_COLUMNS), a row per part: 0-8 columns width, depth, axis of its frame; 9-11 start of the axis; 12-15 centre and radius
+`placed` (P, 22), a row per part: 0-8 columns width, depth, axis of its frame; 9-11 start of the axis; 12-15 centre and radius
 of a bounding sphere; 16 length; 17, 18 inverse of its caps; 19 blend; 20 samples per length; 21 where the second material begins.
 `table` (P, samples, 4): inverse half widths and half depths, and the centres along the axis. `code` (P, 3): group and both materials.
 `joints` (groups, 4): where a group blends into the trunk, and the radius. `parts`: number of a tile's parts, then their indices by group.
@@ -15,7 +15,6 @@ import numpy as np
 from shadowpuppet.jit import compiled
 from shadowpuppet.synthetic.compositing import FAR
 
-PLACED_COLUMNS = 22
 STEP_SHARE = 0.85
 """Length of a step over the distance bound: distances to lofts are first-order estimates."""
 HIT, EDGE_HIT = 2.5e-4, 1e-3

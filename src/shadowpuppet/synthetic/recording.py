@@ -14,7 +14,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import RecordingError, SettingsError, warn
 from shadowpuppet.geometry import Array
 from shadowpuppet.synthetic.faults.camera_faults import CameraFaults
-from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEAD_SECONDS, LEVEL, TAIL_SECONDS, posture, trunk
+from shadowpuppet.synthetic.movement.gestures import HANGING_ARMS, LEVEL, PAUSE_SECONDS, posture, trunk
 from shadowpuppet.synthetic.person.kinematics import PosedBody, pose
 from shadowpuppet.synthetic.scene_renderer import SceneRenderer, bystander_body
 from shadowpuppet.synthetic.spec import Bystander, Scene, Spec
@@ -118,7 +118,7 @@ def _figure(spec: Spec, t: Array, rng: np.random.Generator) -> PosedBody:
 def _bystander(spec: Spec, someone: Bystander, count: int, rng: np.random.Generator, person: PosedBody | None = None) -> PosedBody:
     """The figure of a bystander in `count` frames, at the bystander's place beside the `person`; None: beside the origin."""
     again = int(np.ceil(count / spec.rate / 3600))  # a gesture takes an hour at most
-    length = count / spec.rate - (LEAD_SECONDS + TAIL_SECONDS if someone.from_start else 0.0)  # they begin and end together
+    length = count / spec.rate - (2 * PAUSE_SECONDS if someone.from_start else 0.0)  # they begin and end together
     gestures = (replace(someone.motion, seconds=max(2.0, length / again)),) * again
     always = replace(spec, body=bystander_body(someone), motion=gestures, turn_deg=someone.turn_deg, begin=0.0, frames=None,
                      posture="standing", scene=Scene())

@@ -32,8 +32,6 @@ DOORS = {"protocol_whitelist": "file", "format_whitelist": ",".join(CONTAINERS),
 files do not open them."""
 GUARDS = {"max_pixels": str(MOST_PIXELS)}
 """Options of FFmpeg: no decoder makes larger pictures."""
-FRAME_BYTES = 3
-"""Bytes a pixel of a frame that a decoding thread holds."""
 
 
 @contextlib.contextmanager
@@ -88,8 +86,8 @@ def _stated_size(path: Path) -> tuple[int, int]:
 
 
 def _threads(pixels: int) -> int:
-    """Number of threads that decode frames of `pixels`; each thread holds one frame. 0: FFmpeg's default."""
-    most, limit = FILE_MEMORY // (FRAME_BYTES * max(pixels, 1)), thread_limit() or 0
+    """Number of threads that decode frames of `pixels`; each thread holds one frame, of 3 bytes a pixel. 0: FFmpeg's default."""
+    most, limit = FILE_MEMORY // (3 * max(pixels, 1)), thread_limit() or 0
     return limit if most >= (limit or os.cpu_count() or 1) else max(most, 1)
 
 

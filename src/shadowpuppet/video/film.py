@@ -26,8 +26,6 @@ PLAIN_LUMA = re.compile(r"yuvj?4\d\dp|nv12|nv16|nv21|gray")
 """Pixel formats whose first plane is the 8-bit luma."""
 DEEP_LUMA = re.compile(r"yuv|p[024]1|gray1")
 """Pixel formats with more bits."""
-FULL_RANGE = 2
-"""FFmpeg's AVCOL_RANGE_JPEG: luma over 0..255."""
 EVEN = 0.25
 """Greatest difference of a steady film's times from even ones, over their interval: a missing frame makes half."""
 NOT_LATER = "one that is not later"
@@ -282,8 +280,9 @@ def converter(grey: bool) -> Callable[[VideoFrame], Image]:
 def _luma(frame: VideoFrame) -> Image:
     """The luma plane (H, W), scaled to 0..255, without colour conversion."""
     import cv2
+    from av.video.reformatter import ColorRange
 
     plane = frame.planes[0]
     luma = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)[:, : frame.width]  # rows are padded
-    full = frame.color_range == FULL_RANGE or frame.format.name.startswith(("yuvj", "gray"))
+    full = frame.color_range == ColorRange.JPEG or frame.format.name.startswith(("yuvj", "gray"))
     return luma.copy() if full else np.asarray(cv2.LUT(luma, STUDIO_TO_FULL), np.uint8)

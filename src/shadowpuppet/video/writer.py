@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 CRF = 18
 """Constant rate factor of H.264 with hardly visible loss."""
-BT601, STUDIO_RANGE = 6, 1
-"""FFmpeg's AVCOL_SPC_SMPTE170M and AVCOL_RANGE_MPEG, stated so that players need not guess the conversion of colours."""
+BT601 = 6
+"""FFmpeg's AVCOL_SPC_SMPTE170M, stated with the range of luma so that players need not guess the conversion of colours."""
 
 
 def write_frames(path: str | Path, rate: float, *, size: Size | None = None, lossless: bool = False, crf: int = CRF,
@@ -118,6 +118,7 @@ class FrameWriter:
 
     def _open(self, image: Image) -> None:
         import av
+        from av.video.reformatter import ColorRange
 
         # Readable at any time, even after a kill: flushed, .mp4 and .mov in fragments.
         options = {"flush_packets": "1"} | ({} if self.path.suffix == ".mkv" else {"movflags": "hybrid_fragmented"})
@@ -131,7 +132,7 @@ class FrameWriter:
         stream.pix_fmt = "yuv420p" if not self.lossless else "gray" if image.ndim == 2 else "bgr0"
         stream.codec_context.time_base, stream.codec_context.thread_count = self._base, self.threads
         if not self.lossless:
-            stream.codec_context.colorspace, stream.codec_context.color_range = BT601, STUDIO_RANGE
+            stream.codec_context.colorspace, stream.codec_context.color_range = BT601, ColorRange.MPEG
         self._stream = stream
         container.start_encoding()  # creates the file, so that an error is raised now
         self._intact = True

@@ -9,9 +9,8 @@ from pathlib import Path
 import pytest
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io.inputs import content
-from shadowpuppet.io.inputs.content import content_of
-from shadowpuppet.io.inputs.inputs import Inputs, fingerprint, inputs_of
+from shadowpuppet.io.inputs import inputs
+from shadowpuppet.io.inputs.inputs import Inputs, content_of, fingerprint, inputs_of
 from shadowpuppet.io.inputs.same_run import INPUTS, check_same, write_inputs
 
 FILES = ("calibration.toml", "recording.toml", "video/a.mp4", "video/b.mp4", "background/a.png", "masks/a/1.png", "masks/a/2.png",
@@ -84,9 +83,9 @@ def test_a_copy_in_another_place_has_the_same_content(lab, tmp_path):
 
 
 def test_long_files_are_known_by_blocks_over_all_of_their_length(tmp_path, monkeypatch):
-    monkeypatch.setattr(content, "WHOLE", 1 << 16)
-    monkeypatch.setattr(content, "LEAST", 1 << 16)
-    film, size, gap = tmp_path / "film.mp4", 10 ** 6, 10 ** 6 // (content.BLOCKS - 1)
+    monkeypatch.setattr(inputs, "WHOLE", 1 << 16)
+    monkeypatch.setattr(inputs, "LEAST", 1 << 16)
+    film, size, gap = tmp_path / "film.mp4", 10 ** 6, 10 ** 6 // (inputs.BLOCKS - 1)
     film.write_bytes(bytes(size))
     whole = content_of([("", film)])
     for place, stretch in ((0, 1), (size - 1, 1), *((place, gap) for place in range(0, size - gap, gap // 7))):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.motion.interpolation import resample, resample_table
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion.prior.clips import mirrored, without_gaps
+from shadowpuppet.motion.prior.training import mirrored, without_gaps
 
 NAMES = ("pelvis", "left_hip", "left_knee", "right_hip", "right_knee")
 

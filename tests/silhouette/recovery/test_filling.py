@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shadowpuppet.silhouette.recovery.filling import filled
+from shadowpuppet.silhouette.recovery.scene import filled
 
 
 @pytest.mark.parametrize("colours", [None, 3])

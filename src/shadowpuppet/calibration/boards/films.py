@@ -15,6 +15,7 @@ from shadowpuppet.calibration.boards.detection import BoardDetector, View
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, evenly_spread
 from shadowpuppet.names import composed
+from shadowpuppet.silhouette.background import to_brightness
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.video.container import FILM_SUFFIXES, opened
 from shadowpuppet.video.images import IMAGE_SUFFIXES, read_image
@@ -119,23 +120,23 @@ def _read_film(path: Path, facts: _Facts, board: Board, times: Array, start: flo
             if found_size != facts.size:
                 raise CalibrationError(f"{file}: found {found_size[0]} x {found_size[1]} pixels, expected {facts.size[0]} x "
                                        f"{facts.size[1]} as in {chosen[0].name}")
-        views = [detector.find(_grey(read_image(file)), float(n)) for n, file in enumerate(chosen)]
-        _check_not_mirrored(path, board, detector, views, [_grey(read_image(file)) for file in chosen[:MIRROR_TRIES]])
+        views = [detector.find(to_brightness(read_image(file)), float(n)) for n, file in enumerate(chosen)]
+        _check_not_mirrored(path, board, detector, views, [to_brightness(read_image(file)) for file in chosen[:MIRROR_TRIES]])
         return BoardFilm(path, facts.size, 0.0, np.arange(len(chosen), dtype=float), tuple(views), (None,) * len(views))
     views, velocities = list[View | None](), list[Array | None]()
     with Seeker(path, facts.size) as film:
         for time in times.tolist():
             picture = film.at(time + start) if time + start >= 0 else None
-            view = None if picture is None else detector.find(_grey(picture), time)
+            view = None if picture is None else detector.find(to_brightness(picture), time)
             shown = film.shown
             later = film.at(shown + 1 / facts.rate) if moving and view is not None else None
-            speed = None if view is None or later is None else _velocity(view, detector.find(_grey(later)), facts.rate)
+            speed = None if view is None or later is None else _velocity(view, detector.find(to_brightness(later)), facts.rate)
             if view is not None and speed is not None:  # frames lie beside the wanted times, each film's elsewhere
                 view = view._replace(pixels=view.pixels + speed * (time + start - shown))
             velocities.append(speed)
             views.append(view)
         tries = [film.at(float(t)) for t in np.linspace(0, times[-1] + start, MIRROR_TRIES)] if not any(views) else []
-    _check_not_mirrored(path, board, detector, views, [_grey(picture) for picture in tries if picture is not None])
+    _check_not_mirrored(path, board, detector, views, [to_brightness(picture) for picture in tries if picture is not None])
     return BoardFilm(path, facts.size, facts.rate, times, tuple(views), tuple(velocities))
 
 
@@ -158,12 +159,6 @@ def _check_not_mirrored(path: Path, board: Board, detector: BoardDetector, views
     if board.kind == "charuco" and not any(views) and any(detector.find(np.ascontiguousarray(grey[:, ::-1])) for grey in pictures):
         raise CalibrationError(f"{path}: the film is mirrored: the board's markers are found only when left and right are exchanged; turn "
                                "the camera's mirroring off, and film again")
-
-
-def _grey(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    import cv2
-
-    return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
 
 
 def view_at_rest(views: Sequence[View]) -> View | None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from scipy.constants import inch
+
 from shadowpuppet.calibration.boards.board import Board, check_turned
-from shadowpuppet.errors import CalibrationError, reason
+from shadowpuppet.errors import CalibrationError
 from shadowpuppet.io.files.text import write_whole
 
-POINTS_PER_METRE = 72 / 0.0254
+POINTS_PER_METRE = 72 / inch
 PAPERS = {"A4": (0.210, 0.297), "A3": (0.297, 0.420), "A2": (0.420, 0.594), "A1": (0.594, 0.841), "A0": (0.841, 1.189)}
 """Widths and heights of sheets, metres."""
 MARGIN = 0.012
@@ -21,16 +23,13 @@ RULER = 0.1
 
 
 def write_board(path: Path, board: Board) -> str:
-    """Write the board as a PDF of true size; returns the sheet's name. Raises `CalibrationError` if it cannot be written, or looks the same
-    after half a turn."""
+    """Write the board as a PDF of true size; returns the sheet's name. Raises `ShadowPuppetError` if it cannot be written, or looks the
+    same after half a turn."""
     check_turned(board)
     if path.suffix.lower() != ".pdf":
         raise CalibrationError(f"{path}: found the ending {path.suffix!r}, expected .pdf")
     name, width, height = sheet_of(board)
-    try:
-        write_whole(path, board_pdf(board, width, height))
-    except OSError as error:
-        raise CalibrationError(f"{path}: cannot be written ({reason(error)})") from None
+    write_whole(path, board_pdf(board, width, height))
     return name
 
 

@@ -37,7 +37,8 @@ STEPS, LEAST_GAIN = 40, 1e-6
 """Greatest number of steps with each loss, and the relative decrease that ends them."""
 NUDGE = 1e-5
 """Difference of the numeric derivatives, rad, m and share of the focal length."""
-TURN, MOVE, FOCAL, PARAMETERS = slice(0, 3), slice(3, 6), 6, 7
+TURN, MOVE, FOCAL = slice(0, 3), slice(3, 6), 6
+PARAMETERS = FOCAL + 1
 """A camera's increments: a rotation vector and a displacement along its axes, rad and m, and the logarithm of its focal length's factor."""
 OUTLINE_ERROR, OUTLINE_SHIFT = 0.5, 10.0
 """Error of an outline that does not change while the person stands still, and the movement of its middle that makes another outline of it,

@@ -12,8 +12,6 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.evaluation.report.html import document, figure, plain, rows, table
 from shadowpuppet.geometry import Array, evenly_spread
 
-MOST_DOTS = 1500
-"""Greatest number of corners drawn of a camera."""
 MAP_WIDTH, PICTURE_WIDTH = 520, 340
 """Widths of the drawings, pixels."""
 ARROW_SCALE = 40.0
@@ -83,7 +81,7 @@ def _picture(fit: LensFit) -> str:
     """Corners and errors over the picture's frame, as SVG."""
     width, height = fit.camera.size
     k = PICTURE_WIDTH / width
-    chosen = evenly_spread(len(fit.corners), MOST_DOTS)
+    chosen = evenly_spread(len(fit.corners), 1500)
     ends = fit.corners + ARROW_SCALE * fit.residuals
     marks = "".join(f"M{k * a:.1f} {k * b:.1f}L{k * c:.1f} {k * d:.1f}" for (a, b), (c, d) in zip(fit.corners[chosen], ends[chosen]))
     dots = "".join(f'<circle cx="{k * a:.1f}" cy="{k * b:.1f}" r="1.1"/>' for a, b in fit.corners[chosen])

@@ -39,7 +39,6 @@ MAX_WIDTH = 1280
 """Largest width of a picture in the page, pixels."""
 MIN_HEIGHT = 440
 """Height of a picture at which thin lines look good, pixels."""
-QUALITY = 82
 
 
 @dataclass(frozen=True)
@@ -281,6 +280,6 @@ def _jpeg(image: Image) -> bytes:
     import cv2
 
     small = _scaled(image, width=MAX_WIDTH) if image.shape[1] > MAX_WIDTH else image
-    done, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    done, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 82])
     assert done
     return data.tobytes()

@@ -1,8 +1,9 @@
-"""Reads XML of motion capture systems and OpenCV, without entities, with limited depth."""
+"""Reads XML of motion capture systems and OpenCV, without entities, with limited depth; which of a system's cameras make films."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import cast
 from xml.etree.ElementTree import Element, ParseError, XMLPullParser
@@ -11,6 +12,8 @@ from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.calibration.draft import numbers_of, text_of
 from shadowpuppet.io.calibration.keys import unknown_keys
+from shadowpuppet.names import composed
+from shadowpuppet.video import FILM_SUFFIXES
 
 MAX_DEPTH = 40
 """Greatest depth of nested elements; calibrations have seven levels."""
@@ -82,3 +85,26 @@ def entries(path: Path, root: Element, tag: str, name: str) -> Iterator[Entry]:
     """Elements with tag `tag`, one per camera, named by their attribute `name`, or numbered."""
     for n, element in enumerate(root.iterfind(tag)):
         yield Entry(path, element.get(name) or str(n + 1), element)
+
+
+FOR_FILMS = re.compile("video|hybrid", re.IGNORECASE)
+"""Kinds of cameras that make films; others do, too, if their program is set so."""
+
+
+def of_films(path: Path, cameras: Sequence[Entry], kind: str) -> list[Entry]:
+    """The cameras of a calibration file that have a film beside it or in the recording around it, and those made for films by their
+    attribute `kind`; all if there is neither."""
+    there = _filmed(path)
+    return [entry for entry in cameras
+            if composed(entry.camera) in there or FOR_FILMS.search(entry.element.get(kind, ""))] or list(cameras)
+
+
+def _filmed(path: Path) -> set[str]:
+    """Names of the films, and of folders of pictures, in the recording in which a calibration lies."""
+    folder = path.parent.parent if path.parent.name.lower() == "calibration" else path.parent
+    names = set[str]()
+    for place in (folder, folder / "video", folder / "videos"):
+        inside = list(place.iterdir()) if place.is_dir() else []
+        names |= {each.stem for each in inside if each.suffix.lower() in FILM_SUFFIXES}
+        names |= {each.name for each in inside if place != folder and each.is_dir()}
+    return set(map(composed, names))

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.errors import CalibrationError, choices, shown
-from shadowpuppet.geometry import Array, rigid
+from shadowpuppet.geometry import Array, rigid, rotation_from_quaternion
 from shadowpuppet.io.calibration.draft import Draft, Drafts, numbers_of, text_of
 
 MODELS = {"SIMPLE_PINHOLE": 3, "PINHOLE": 4, "SIMPLE_RADIAL": 4, "RADIAL": 5, "OPENCV": 8, "OPENCV_FISHEYE": 8, "FULL_OPENCV": 12}
@@ -76,12 +76,7 @@ def _lenses(file: Path) -> dict[str, tuple[list[float], Array, Array, bool]]:
 
 
 def _pose(file: Path, n: int, pose: Array) -> Array:
-    w, x, y, z = pose[:4]
     length = float(np.linalg.norm(pose[:4]))
     if not 0.9 < length < 1.1:
         raise CalibrationError(f"{file}, line {n}: found the quaternion {pose[:4].tolist()}, expected one of length 1")
-    w, x, y, z = pose[:4] / length
-    R = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
-    return rigid(R, pose[4:])
+    return rigid(rotation_from_quaternion(np.roll(pose[:4], -1) / length), pose[4:])

@@ -17,8 +17,6 @@ from shadowpuppet.video import FILM_SUFFIXES
 
 KRT_ROWS = (3, 3, 3, 0, 4, 4, 4)
 """Numbers in each row of a camera in a KRT file, after its name; 0: any number of distortion coefficients."""
-BIOCV_NUMBERS = 2 + 9 + 16
-"""Numbers in BioCV's file before the distortion coefficients."""
 COEFFICIENTS = (1, 2, 4, 5, 8)
 """Possible numbers of distortion coefficients; one or two are radial."""
 
@@ -45,15 +43,15 @@ def read_biocv(path: Path) -> Drafts:
 
 
 def _biocv_camera(path: Path) -> Draft:
-    values = numbers_of(text_of(path), tuple(BIOCV_NUMBERS + count for count in COEFFICIENTS))
+    values = numbers_of(text_of(path), tuple(2 + 9 + 16 + count for count in COEFFICIENTS))
     if values is None:
         raise CalibrationError(f"{path}: found other than finite numbers, or not as many as in BioCV's files: width, height, K (3 x 3), "
                                f"world to camera (4 x 4), and {', '.join(map(str, COEFFICIENTS))} distortion coefficients")
     name = path.stem
     for ending in FILM_SUFFIXES:
         name = name.removesuffix(ending)
-    return Draft(name=name, matrix=values[2:11].reshape(3, 3), distortion=_coefficients(values[BIOCV_NUMBERS:]),
-                 T=values[11:BIOCV_NUMBERS].reshape(4, 4), size=values[:2].tolist())
+    size, matrix, placed, lens = np.split(values, np.cumsum([2, 9, 16]))
+    return Draft(name=name, matrix=matrix.reshape(3, 3), distortion=_coefficients(lens), T=placed.reshape(4, 4), size=size.tolist())
 
 
 def _row(path: Path, line: int, cells: list[str], count: int) -> Array:

@@ -19,10 +19,8 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError, choices
 from shadowpuppet.geometry import Array, rigid, rotation_from_vector, vector_from_rotation
 from shadowpuppet.io.calibration.draft import Draft, Drafts
-from shadowpuppet.io.calibration.keys import LENS_KEYS, UNIT_KEYS, is_fisheye, stated_unit, unknown_keys
+from shadowpuppet.io.calibration.keys import LENS_KEYS, UNIT_KEYS, is_fisheye, is_transposed, stated_unit, unknown_keys
 from shadowpuppet.io.calibration.opencv_storage import read_storage
-from shadowpuppet.io.calibration.programs.jarvis import UNIT as JARVIS_UNIT
-from shadowpuppet.io.calibration.programs.jarvis import is_jarvis, untransposed
 from shadowpuppet.io.calibration.programs.mc_calib import is_mc_calib, read_mc_calib
 
 STEMS = {
@@ -42,6 +40,8 @@ IGNORED = re.compile("names|camera_name|calibration_(time|date)|n_?frames|nr_of_
 PAIR = (("intri", "extri"), ("intrinsics", "extrinsics"), ("intrinsic", "extrinsic"))
 """Names of pairs of files."""
 SUFFIXES = (".yml", ".yaml", ".xml")
+JARVIS = ("intrinsicMatrix", "R")
+"""JARVIS' keys of K and R, which are transposed there, as in MATLAB; its T is in millimetres."""
 
 
 def read_opencv(path: Path) -> Drafts:
@@ -88,8 +88,8 @@ def _drafts(path: Path, values: dict[str, Any], alone: str) -> Drafts:
     try:
         if is_mc_calib(values):
             return read_mc_calib(values)
-        jarvis, fisheye, unit = is_jarvis(values), is_fisheye("", values), stated_unit("", [values])
-        cameras = _grouped(untransposed(values) if jarvis else values)
+        jarvis, fisheye, unit = _is_jarvis(values), is_fisheye("", values), stated_unit("", [values])
+        cameras = _grouped(values | {key: values[key].T for key in JARVIS} if jarvis else values)
         lenses = {end: parts for end, parts in cameras.items() if "matrix" in parts}
         theirs = [key for key, value in values.items() if (found := _parameter(key, value)) is not None and found[0] in ("", *lenses)]
         unused = tuple(unknown_keys("", values, (*theirs, IGNORED, LENS_KEYS, UNIT_KEYS)))
@@ -112,7 +112,13 @@ def _drafts(path: Path, values: dict[str, Any], alone: str) -> Drafts:
     notes = [f"{path.name} states the lens alone: the camera is taken for level, at the world's origin"] if bare else []
     named = values.get("camera_name") if len(lenses) == 1 and isinstance(values.get("camera_name"), str) else None
     drafts = tuple(_draft(path, named or end or alone, parts, fisheye) for end, parts in lenses.items())
-    return Drafts(drafts, unit or (JARVIS_UNIT if jarvis else None), tuple(notes), unused)
+    return Drafts(drafts, unit or ("mm" if jarvis else None), tuple(notes), unused)
+
+
+def _is_jarvis(values: dict[str, Any]) -> bool:
+    matrix, R = (values.get(key) for key in JARVIS)
+    square = all(isinstance(value, np.ndarray) and value.shape == (3, 3) for value in (matrix, R))
+    return square and is_transposed(np.asarray(matrix))
 
 
 def _grouped(values: dict[str, Any]) -> dict[str, dict[str, Any]]:

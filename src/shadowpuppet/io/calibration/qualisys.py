@@ -14,11 +14,9 @@ import numpy as np
 
 from shadowpuppet.errors import CalibrationError
 from shadowpuppet.geometry import rigid
-from shadowpuppet.io.calibration._xml import Entry, entries, tree_of
+from shadowpuppet.io.calibration._xml import Entry, entries, of_films, tree_of
 from shadowpuppet.io.calibration.draft import Draft, Drafts
-from shadowpuppet.io.calibration.roles import of_films
 
-SUBPIXELS = 64
 BACKWARD = np.diag([1.0, -1.0, -1.0])
 """From axes with y up and z backward to OpenCV's."""
 CAMERA_KEYS = ("active", "avg-residual", "calibrated", "id", "message", "model", "name", "point-count", "points-count", "serial",
@@ -65,7 +63,7 @@ def _is_turned(entry: Entry) -> bool:
 def _draft(entry: Entry) -> Draft:
     view, lens, place = entry.child("fov_video"), entry.child("intrinsic"), entry.child("transform")
     left, top, right, bottom = (view.number(key) for key in ("left", "top", "right", "bottom"))
-    fu, fv, cu, cv = (lens.number(key) / SUBPIXELS for key in ("focalLengthU", "focalLengthV", "centerPointU", "centerPointV"))
+    fu, fv, cu, cv = (lens.number(key) / 64 for key in ("focalLengthU", "focalLengthV", "centerPointU", "centerPointV"))
     radial = [lens.number(f"radialDistortion{n}", "0") for n in (1, 2, 3)]
     tangential = [lens.number(f"tangentalDistortion{n}", "0") for n in (1, 2)]  # sic
     R = BACKWARD @ np.array([[place.number(f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)])

@@ -13,10 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.errors import CalibrationError
-from shadowpuppet.geometry import Array, rigid
-from shadowpuppet.io.calibration._xml import Entry, entries, tree_of
+from shadowpuppet.geometry import Array, rigid, rotation_from_quaternion
+from shadowpuppet.io.calibration._xml import Entry, entries, of_films, tree_of
 from shadowpuppet.io.calibration.draft import Draft, Drafts, numbers_of
-from shadowpuppet.io.calibration.roles import of_films
 
 GRID = 33
 """Grid points along each side at which distortion is compared."""
@@ -41,7 +40,7 @@ class ViconDistortion(NamedTuple):
 
 
 def read_vicon(path: Path) -> Drafts:
-    """Cameras of an .xcp file: those that make films (`roles`). Raises `CalibrationError`."""
+    """Cameras of an .xcp file: those that make films (`of_films`). Raises `CalibrationError`."""
     cameras = list(entries(path, tree_of(path), ".//Camera", "DEVICEID"))
     used = of_films(path, cameras, "TYPE")
     posed = [entry for entry in used if entry.element.find("KeyFrames/KeyFrame") is not None]
@@ -77,14 +76,11 @@ def _draft(entry: Entry, notes: list[str]) -> Draft:
 
 
 def _rotation(frame: Entry) -> Array:
-    x, y, z, w = q = frame.numbers("ORIENTATION", (4,))
+    q = frame.numbers("ORIENTATION", (4,))
     length = float(np.linalg.norm(q))
     if abs(length - 1) > 0.01:
         raise CalibrationError(f"{frame.path}: camera {frame.camera!r}: ORIENTATION: found a quaternion of length {length:g}, expected 1")
-    x, y, z, w = q / length
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    return rotation_from_quaternion(q / length)
 
 
 def _bend(frame: Entry, principal: Array, size: Array, focal: float) -> ViconDistortion:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError
-from shadowpuppet.io.files.npz import read_members
+from shadowpuppet.io.files.npz import read_arrays
 from shadowpuppet.io.files.text import write_whole
 
 TREE = "tree"
@@ -34,7 +34,7 @@ def write_nested(path: Path, value: Any) -> None:
 def read_nested(path: Path, types: Iterable[type]) -> Any:
     """The value in a file that `write_nested` wrote. `types`: the named tuples that may be in it. Raises `FormatError`."""
     try:
-        arrays = read_members(path)
+        arrays = read_arrays(path)
         return _decoded(json.loads(arrays[TREE].tobytes()), arrays, {kind.__name__: kind for kind in types})
     except ShadowPuppetError as error:
         raise FormatError(f"{path}: {error}") from None

@@ -32,14 +32,9 @@ class BrokenArchive(ShadowPuppetError):
     """A file is not a complete archive of arrays."""
 
 
-def read_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
-    """The arrays of an archive that are in `names`. Raises `ShadowPuppetError` with only the reason, `BrokenArchive` for a damaged file."""
-    return read_members(path, names)
-
-
-def read_members(path: Path, names: Sequence[str] | None = None) -> dict[str, NDArray]:
-    """The arrays of an archive, or those of them that are in `names`; sizes are checked before anything is unpacked. Raises the errors of
-    `read_arrays`."""
+def read_arrays(path: Path, names: Sequence[str] | None = None) -> dict[str, NDArray]:
+    """The arrays of an archive, or those of them that are in `names`; sizes are checked before anything is unpacked. Raises
+    `ShadowPuppetError` with only the reason, `BrokenArchive` for a damaged file."""
     found = dict[str, NDArray]()
     try:
         check_regular(path)

@@ -18,6 +18,8 @@ TEXT_LIMIT = 1_000_000_000
 TOML_LIMIT = 2_000_000
 """Greatest size of a calibration or settings file, bytes: what is longer takes many seconds to be parsed, or is a film given by mistake."""
 
+JSON_LIMIT = 50_000_000
+"""Greatest size of a file of JSON that a run writes, bytes."""
 MARKS = {codecs.BOM_UTF32_LE: "utf-32", codecs.BOM_UTF32_BE: "utf-32", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 """Encodings by the first bytes of a file, longer marks first; UTF-8 has its mark or none."""
 UNMARKED = re.compile(rb"[^\0]\0[^\0]\0|\0[^\0]\0[^\0]|[^\0]\0\0\0|\0\0\0[^\0]")

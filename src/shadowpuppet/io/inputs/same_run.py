@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from shadowpuppet.errors import FormatError, ShadowPuppetError, shown
-from shadowpuppet.io.files.text import read_limited, write_whole
+from shadowpuppet.io.files.text import JSON_LIMIT, read_limited, write_whole
 from shadowpuppet.io.inputs.inputs import MOST_NAMED, Inputs
 
 INPUTS = "checkpoint.json"
 """File beside a checkpoint with the content of each of the run's inputs (`Inputs.contents`)."""
-LIMIT = 50_000_000
-"""Greatest size of that file, bytes."""
 NOT_COMPARED = {"complete", "frames", "smoothing", "floor", "people"}
 """Entries of run.toml that a run gets at its end."""
 PLACES = {"recording", "truth"}
@@ -33,7 +31,7 @@ def read_inputs(folder: Path) -> dict[str, str]:
         raise FormatError(f"{folder}: found a checkpoint without {INPUTS}, as earlier versions wrote it: it does not say with which "
                           "films and calibration the run began; expected --force, which starts over")
     try:
-        found = json.loads(read_limited(path, LIMIT, FormatError, "a JSON file"))["inputs"]
+        found = json.loads(read_limited(path, JSON_LIMIT, FormatError, "a JSON file"))["inputs"]
         if not all(isinstance(text, str) for text in found.values()):
             raise TypeError("found a value that is no text")
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.camera.keypoints import LANDMARKS, Keypoints
 from shadowpuppet.errors import ShadowPuppetError
-from shadowpuppet.io.files.npz import archive_bytes, read_members
+from shadowpuppet.io.files.npz import archive_bytes, read_arrays
 from shadowpuppet.io.files.table import shorten
 from shadowpuppet.io.files.text import errors_named, write_whole
 from shadowpuppet.io.picture_sizes import differ_by_padding
@@ -95,7 +95,7 @@ def write_keypoints(path: Path, film: FilmKeypoints) -> None:
 def read_npz(path: Path, size: tuple[int, int]) -> FilmKeypoints:
     """Keypoints (.npz) of a film of a `size`. Raises `FormatError`, naming file and array."""
     with errors_named(path):
-        arrays = read_members(path)
+        arrays = read_arrays(path)
         for name in DIMENSIONS:
             _check_array(name, arrays)
         unknown = sorted(set(arrays) - set(DIMENSIONS))

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.constants import inch
 
 from shadowpuppet.errors import FormatError, choices
 from shadowpuppet.geometry import Array, rotation_about
 from shadowpuppet.io.files.table import shorten, with_point
 from shadowpuppet.io.files.text import read_text
 
-INCH = 0.0254
 DOFS = ("rx", "ry", "rz")
 """Degrees of freedom of bones; stretching bones are not supported."""
 ROOT = ("tx", "ty", "tz", "rx", "ry", "rz")
@@ -76,7 +76,7 @@ def read_asf(path: str | Path) -> AcclaimSkeleton:
     if scale <= 0:
         raise FormatError(f"{path}: line {units['length'][0]}, length: found {scale:g}, expected more than 0")
     degrees = units.get("angle", (0, ["deg"]))[1][:1] != ["rad"]
-    unit = INCH / scale
+    unit = inch / scale
     bones = [_bone(path, rows, unit, degrees) for rows in _blocks(path, sections["bonedata"])]
     if not bones:
         raise FormatError(f"{path}: found no bones, expected blocks from begin to end under :bonedata")

@@ -28,7 +28,7 @@ KEY = 0x50
 """The second byte of every file."""
 INTEL, DEC, MIPS = 84, 85, 86
 """Kinds of processors in the parameter section."""
-BITS = 0xFFFF
+BITS = np.iinfo(np.uint16).max
 """Greatest number of frames that the header can state."""
 MAX_COORDINATE = 1e6
 """Largest coordinate, metres; larger ones count as unknown."""

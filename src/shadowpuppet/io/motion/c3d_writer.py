@@ -18,16 +18,10 @@ from shadowpuppet.motion.contact.contact import FootEvent
 from shadowpuppet.motion.interpolation import resample, uniform_sampling
 from shadowpuppet.motion.motion import JointTable
 
-MM = 1000.0
-"""Millimetres, the file's unit, per metre."""
-MAX_BLOCKS, MAX_NAMES, MAX_LETTERS = 255, 255, 120
-"""The format's limits: blocks of parameters, names in a list, letters of a name."""
+MAX_BYTE, MAX_LETTERS = np.iinfo(np.uint8).max, 120
+"""The format's limits: of what it keeps in a byte (blocks of parameters, names in a list, residuals in mm), and letters of a name."""
 MAX_FRAME = 2**31
 """Greatest number of a frame."""
-MAX_RESIDUAL = 255
-"""Greatest residual, millimetres: a byte in the format's integer files."""
-UNKNOWN_RESIDUAL = -1.0
-"""Marks an unknown position."""
 EVENTS = {True: "Foot Strike", False: "Foot Off"}
 """Events of a foot, in the words of Vicon's programs."""
 Parameter = tuple[str, int, Sequence[int], bytes]
@@ -72,8 +66,8 @@ def write_c3d(path: str | Path, table: JointTable, spread: Array | None = None, 
         if len(section) <= blocks * BYTES:
             break
         blocks = -(-len(section) // BYTES)
-    if blocks > MAX_BLOCKS:
-        raise ShadowPuppetError(f"{path}: found {points} points, whose names need more than this format holds ({MAX_BLOCKS} blocks)")
+    if blocks > MAX_BYTE:
+        raise ShadowPuppetError(f"{path}: found {points} points, whose names need more than this format holds ({MAX_BYTE} blocks)")
     head = _header(points, len(angles), (first, count), 2 + blocks, rate)
     write_whole(path, head + section.ljust(blocks * BYTES, b"\0") + data.tobytes() + b"\0" * (-data.nbytes % BYTES))
 
@@ -91,10 +85,10 @@ def _at_constant_rate(path: Path, times: Array, values: Array) -> tuple[float, A
 
 
 def _points(places: Array, deviations: Array) -> Array:
-    """Positions (T, J, 3) with their residuals, (T, J, 4), in the file's unit."""
+    """Positions (T, J, 3) with their residuals, (T, J, 4), millimetres; -1 for unknown positions."""
     known: NDArray[np.bool_] = np.asarray(np.isfinite(places).all(2))
-    residuals = np.where(np.isfinite(deviations), np.round(np.minimum(MM * np.nan_to_num(deviations), MAX_RESIDUAL)), 0.0)
-    return np.concatenate([np.where(known[..., None], MM * places, 0.0), np.where(known, residuals, UNKNOWN_RESIDUAL)[..., None]], 2)
+    residuals = np.where(np.isfinite(deviations), np.round(np.minimum(1000 * np.nan_to_num(deviations), MAX_BYTE)), 0.0)
+    return np.concatenate([np.where(known[..., None], 1000 * places, 0.0), np.where(known, residuals, -1.0)[..., None]], 2)
 
 
 def _header(points: int, analog: int, frames: tuple[int, int], start: int, rate: float) -> bytes:
@@ -127,7 +121,7 @@ def _groups(names: Sequence[str], angles: Angles, rate: float, frames: tuple[int
 
 def _events(events: Sequence[FootEvent]) -> dict[str, list[Parameter]]:
     """The group EVENT: of each its time in minutes and seconds, the side, and what happens."""
-    events = events[:MAX_NAMES]
+    events = events[:MAX_BYTE]
     if not events:
         return {}
     times = np.array([divmod(event.time, 60) for event in events], "<f4")
@@ -150,7 +144,7 @@ def _word(name: str, word: str) -> Parameter:
 
 def _words(name: str, words: Sequence[str]) -> list[Parameter]:
     """A list of words, continued in NAME2, NAME3, ... if it is too long."""
-    parts = [[word.encode() for word in words[n : n + MAX_NAMES]] for n in range(0, len(words), MAX_NAMES)]
+    parts = [[word.encode() for word in words[n : n + MAX_BYTE]] for n in range(0, len(words), MAX_BYTE)]
     widths = [max(map(len, part)) for part in parts]
     return [(f"{name}{n if n > 1 else ''}", CHAR, (width, len(part)), b"".join(word.ljust(width) for word in part))
             for n, (part, width) in enumerate(zip(parts, widths), 1)]  # fmt: skip

@@ -16,8 +16,8 @@ from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.motion.animation import Y_UP, Animation
 from shadowpuppet.motion.mesh import Mesh
 
-FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
-"""Types of numbers in buffers."""
+TYPES = {"<f4": 5126, "u1": 5121, "<u2": 5123, "<u4": 5125}
+"""The format's numbers of the types of values in buffers."""
 POINTS, INDICES = 34962, 34963
 """Targets of buffers: vertices, and indices of triangles."""
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -41,7 +41,7 @@ def write_glb(path: str | Path, animation: Animation, mesh: Mesh, smoothing: str
         warn(f"{path}: {gaps} of {len(animation.times)} frames are not known: the puppet is hidden in them")
     buffer = _Buffer()
     primitive = _primitive(buffer, mesh)
-    skin = buffer.add(_inverse_bind(animation), "MAT4", FLOAT)
+    skin = buffer.add(_inverse_bind(animation), "MAT4")
     motion = _motion(buffer, animation, known)
     joints = _nodes(animation, None if at_rest else int(known[0]))
     content = {
@@ -67,13 +67,12 @@ class _Buffer:
     def __init__(self) -> None:
         self.data, self.views, self.accessors = bytearray(), list[dict[str, Any]](), list[dict[str, Any]]()
 
-    def add(self, values: NDArray, kind: str, number: int, bounds: bool = False, target: int | None = None) -> int:
-        """Append values (N, width of `kind`); returns the index of their accessor. `bounds`: store minimum and maximum."""
-        dtype = {FLOAT: "<f4", BYTE: "u1", SHORT: "<u2", INT: "<u4"}[number]
+    def add(self, values: NDArray, kind: str, dtype: str = "<f4", bounds: bool = False, target: int | None = None) -> int:
+        """Append values (N, width of `kind`) as one of `TYPES`; returns their accessor's index. `bounds`: store minimum and maximum."""
         flat = np.ascontiguousarray(values).astype(dtype).reshape(-1, WIDTHS[kind])
         view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.data), "byteLength": flat.nbytes}
         self.views.append(view | ({"target": target} if target else {}))
-        accessor: dict[str, Any] = {"bufferView": len(self.views) - 1, "componentType": number, "count": len(flat), "type": kind}
+        accessor: dict[str, Any] = {"bufferView": len(self.views) - 1, "componentType": TYPES[dtype], "count": len(flat), "type": kind}
         if bounds:
             accessor |= {"min": flat.min(0).tolist(), "max": flat.max(0).tolist()}
         self.accessors.append(accessor)
@@ -85,13 +84,13 @@ def _primitive(buffer: _Buffer, mesh: Mesh) -> dict[str, Any]:
     """The mesh; each point belongs to one joint."""
     joints = np.stack([mesh.joints, *[np.zeros_like(mesh.joints)] * 3], 1)
     attributes = {
-        "POSITION": buffer.add(mesh.points, "VEC3", FLOAT, bounds=True, target=POINTS),
-        "NORMAL": buffer.add(mesh.normals, "VEC3", FLOAT, target=POINTS),
-        "COLOR_0": buffer.add(mesh.colours, "VEC3", FLOAT, target=POINTS),
-        "JOINTS_0": buffer.add(joints, "VEC4", BYTE if mesh.joints.max() < 256 else SHORT, target=POINTS),
-        "WEIGHTS_0": buffer.add(np.tile([1.0, 0, 0, 0], (len(joints), 1)), "VEC4", FLOAT, target=POINTS),
+        "POSITION": buffer.add(mesh.points, "VEC3", bounds=True, target=POINTS),
+        "NORMAL": buffer.add(mesh.normals, "VEC3", target=POINTS),
+        "COLOR_0": buffer.add(mesh.colours, "VEC3", target=POINTS),
+        "JOINTS_0": buffer.add(joints, "VEC4", "u1" if mesh.joints.max() < 256 else "<u2", target=POINTS),
+        "WEIGHTS_0": buffer.add(np.tile([1.0, 0, 0, 0], (len(joints), 1)), "VEC4", target=POINTS),
     }
-    triangles = buffer.add(mesh.triangles, "SCALAR", INT if len(mesh.points) > 0xFFFF else SHORT, target=INDICES)
+    triangles = buffer.add(mesh.triangles, "SCALAR", "<u4" if len(mesh.points) > 0xFFFF else "<u2", target=INDICES)
     return {"attributes": attributes, "indices": triangles, "material": 0}
 
 
@@ -121,11 +120,11 @@ def _nodes(animation: Animation, frame: int | None) -> list[dict[str, Any]]:
 def _motion(buffer: _Buffer, animation: Animation, known: NDArray[np.int64]) -> dict[str, Any]:
     """Samplers and channels: rotations and positions of joints if they change, and scale 0 in unknown frames."""
     times = animation.times - animation.times[0]
-    keys, shifts = buffer.add(times[known], "SCALAR", FLOAT, bounds=True), _shifts(animation)[known]
+    keys, shifts = buffer.add(times[known], "SCALAR", bounds=True), _shifts(animation)[known]
     samplers, channels = list[dict[str, Any]](), list[dict[str, Any]]()
 
     def animate(joint: int, path: str, values: Array, at: int = keys, how: str = "LINEAR") -> None:
-        output = buffer.add(values, "VEC4" if path == "rotation" else "VEC3", FLOAT)
+        output = buffer.add(values, "VEC4" if path == "rotation" else "VEC3")
         samplers.append({"input": at, "output": output, "interpolation": how})
         channels.append({"sampler": len(samplers) - 1, "target": {"node": joint + 1, "path": path}})
 
@@ -138,7 +137,7 @@ def _motion(buffer: _Buffer, animation: Animation, known: NDArray[np.int64]) -> 
     gaps = _gaps(animation)
     if gaps:
         changes = np.flatnonzero(np.diff(animation.known.astype(int), prepend=-1))
-        at = buffer.add(times[changes], "SCALAR", FLOAT, bounds=True)
+        at = buffer.add(times[changes], "SCALAR", bounds=True)
         animate(0, "scale", np.repeat(animation.known[changes, None].astype(float), 3, 1), at, "STEP")
     found: dict[str, Any] = {"name": "motion", "samplers": samplers, "channels": channels}
     return found | ({"extras": {"unknown": gaps}} if gaps else {})

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 MIN_SIDE, MAX_SIDE = 640, 960
 """Limits of the picture's longer side, pixels; lines on smaller pictures would look coarse."""
-DIM = 0.45
-"""Brightness of a picture without tracking."""
 
 
 def drawn(view: SessionState) -> Image | None:
@@ -31,7 +29,7 @@ def drawn(view: SessionState) -> Image | None:
     out = view.image if view.image.ndim == 3 else cv2.cvtColor(view.image, cv2.COLOR_GRAY2BGR)
     out = np.array(cv2.resize(out, size, interpolation=cv2.INTER_LINEAR), np.uint8)
     if view.trouble or view.phase in ("learning", "measuring"):
-        out = np.asarray(cv2.convertScaleAbs(out, alpha=DIM), np.uint8)
+        out = np.asarray(cv2.convertScaleAbs(out, alpha=0.45), np.uint8)  # dim without tracking
     if view.picture is not None and view.pose is not None:
         draw_person(out, _scaled(view.picture, size), view.pose, view.doubtful)
     if view.mask is not None:

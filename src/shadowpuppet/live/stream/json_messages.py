@@ -11,16 +11,14 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.live.display.view import rounded
 from shadowpuppet.live.stream.outlet import StreamFrame, StreamSubject
 
-VERSION = 1
-"""Version of the messages; raised by changes that break programs which read them."""
 FRAME = "right-handed, Z up: the calibration's world, or of a camera that has none its own, X right, Y away from it"
 ROTATIONS = "quaternions x, y, z, w, from the axes of who stands at zero with hanging arms (X forward, Y left, Z up) to the world"
 
 
 def beginning(subject: StreamSubject) -> str:
     """The first message: the person, and what the lists in frames mean."""
-    return _text({
-        "type": "begin", "format": "shadowpuppet", "version": VERSION, "body": subject.body.name, "height": rounded(subject.height, 4),
+    return _text({  # the version is raised by changes that break programs which read the messages
+        "type": "begin", "format": "shadowpuppet", "version": 1, "body": subject.body.name, "height": rounded(subject.height, 4),
         "joints": subject.names, "parents": subject.parents, "angles": subject.body.skeleton.dof_names,
         "units": {"time": "s", "length": "m", "angle": "rad"}, "frame": FRAME, "rotations": ROTATIONS,
     })  # fmt: skip

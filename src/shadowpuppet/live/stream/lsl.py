@@ -15,8 +15,6 @@ CONFIG = "[multicast]\nResolveScope = {scope}\n{listen}[log]\nlevel = -3\n"
 """Configuration of liblsl: scope of the stream's announcement; no log."""
 KINDS = (*(f"Position{axis}" for axis in "XYZ"), *(f"Orientation{axis}" for axis in "XYZW"))
 """Channels of a joint, named as in XDF's meta-data for motion capture."""
-MAX_BUFFERED = 1
-"""Samples that liblsl keeps for a slow receiver, in hundreds (for streams without a rate)."""
 
 
 class LslOutlet(Outlet):
@@ -65,7 +63,7 @@ class LslOutlet(Outlet):
                 for key, value in (("label", f"{joint}_{kind}"), ("marker", joint), ("object", "person"), ("type", kind),
                                    ("unit", "meters" if kind.startswith("P") else "quaternion")):
                     channel.append_child_value(key, value)
-        self._outlet = self._pylsl.StreamOutlet(info, max_buffered=MAX_BUFFERED)
+        self._outlet = self._pylsl.StreamOutlet(info, max_buffered=1)  # hundreds of samples, for a slow receiver
 
     def send(self, frame: StreamFrame) -> None:
         """Send a frame as a sample."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import struct
 from collections.abc import Iterable, Iterator
 
 import numpy as np
@@ -17,13 +18,13 @@ from shadowpuppet.live.stream.avatar import Avatar
 from shadowpuppet.live.stream.outlet import Outlet, StreamFrame, StreamSubject
 from shadowpuppet.network import is_loopback, shown_host
 
-LOADED, CALIBRATED, NORMAL = 1, 3, 0
+READY = (1, 3, 0)
 """First arguments of /VMC/Ext/OK: a model is loaded, calibrated, in the normal mode; the last argument is 1 while the person is tracked."""
 ROOT = ("root", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 """The avatar's root stays at the origin; its hips move."""
 DATAGRAM_BYTES = 1400
 """Largest datagram that Ethernet does not split."""
-BUNDLE_HEAD, LENGTH_FIELD = 16, 4
+BUNDLE_HEAD, LENGTH_FIELD = OscBundleBuilder(IMMEDIATELY).build().size, struct.calcsize(">i")
 """Bytes of a bundle's head, and of the length before each of its messages."""
 
 
@@ -34,8 +35,7 @@ def messages(avatar: Avatar, frame: StreamFrame) -> list[OscMessage]:
     made = [build_msg("/VMC/Ext/Root/Pos", ROOT)] if bones else []
     made += [build_msg("/VMC/Ext/Bone/Pos", (bone.name, *bone.position, *bone.rotation)) for bone in bones]
     made += [build_msg("/shadowpuppet/age", (float(frame.age),))] if np.isfinite(frame.age) else []
-    tracked = (LOADED, CALIBRATED, NORMAL, int(bool(bones)))
-    return [*made, build_msg("/VMC/Ext/OK", tracked), build_msg("/VMC/Ext/T", (float(frame.time),))]
+    return [*made, build_msg("/VMC/Ext/OK", (*READY, int(bool(bones)))), build_msg("/VMC/Ext/T", (float(frame.time),))]
 
 
 def bundles(messages: Iterable[OscMessage], largest: int = DATAGRAM_BYTES) -> Iterator[OscBundle]:

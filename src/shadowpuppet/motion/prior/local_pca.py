@@ -16,8 +16,8 @@ from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 
 Regions = NDArray[np.int64]
-ORTHONORMAL_TOLERANCE = 1e-6
-"""Largest difference of the basis vectors' inner products from one or zero."""
+TOLERANCE = 1e-6
+"""Largest rounding error of what a prior's arrays hold: of inner products of basis vectors, and of sums of probabilities."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class Subspaces:
         for name in ("variances", "noise"):
             if getattr(self, name).min() <= 0:
                 raise ShadowPuppetError(f"{name}: found {getattr(self, name).min()}, expected variances, which are more than zero")
-        if np.abs(self.bases.transpose(0, 2, 1) @ self.bases - np.eye(m)).max() > ORTHONORMAL_TOLERANCE:
+        if np.abs(self.bases.transpose(0, 2, 1) @ self.bases - np.eye(m)).max() > TOLERANCE:
             raise ShadowPuppetError("bases: found vectors that are not orthonormal, expected an orthonormal basis of each region")
 
     def __len__(self) -> int:

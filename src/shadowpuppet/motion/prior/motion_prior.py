@@ -15,10 +15,7 @@ from numpy.typing import ArrayLike
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.prior.local_pca import Regions, Subspaces
-
-SUM_TOLERANCE = 1e-6
-"""Largest difference from one of a sum of probabilities."""
+from shadowpuppet.motion.prior.local_pca import TOLERANCE, Regions, Subspaces
 
 
 class Codes(NamedTuple):
@@ -62,7 +59,7 @@ class MotionPrior:
             object.__setattr__(self, name, values)
             if values.shape != shape:
                 raise ShadowPuppetError(f"{name}: found shape {values.shape}, expected {shape}")
-            if not ((values >= 0).all() and np.abs(values.sum(-1) - 1).max() <= SUM_TOLERANCE):
+            if not ((values >= 0).all() and np.abs(values.sum(-1) - 1).max() <= TOLERANCE):
                 raise ShadowPuppetError(f"{name}: found numbers that are no probabilities, expected none below zero and a sum of one")
         object.__setattr__(self, "names", tuple(str(name) for name in self.names))
         if self.names and (len(self.names) != D or len(set(self.names)) != D):

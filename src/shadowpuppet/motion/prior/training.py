@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import average_sizes, make_body
@@ -14,10 +15,9 @@ from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.errors import ShadowPuppetError, choices, warn
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.interpolation import resample, resample_table
+from shadowpuppet.motion.interpolation import resample, resample_table, true_runs
 from shadowpuppet.motion.inverse_kinematics import FittedPoses, fit_poses
 from shadowpuppet.motion.motion import JointTable
-from shadowpuppet.motion.prior.clips import mirrored, without_gaps
 from shadowpuppet.motion.prior.motion_prior import MotionPrior
 from shadowpuppet.motion.prior.settings import PriorSettings
 from shadowpuppet.motion.prior.vqpca import PriorFit, RegionChoice, choose_regions, fit_prior
@@ -168,3 +168,31 @@ def _check_moves(clips: Sequence[Array], names: str) -> None:
     if float(np.sqrt(np.concatenate(clips).var(0).mean())) < MIN_MOTION:
         warn(f"{names}: nobody moves there, so that the prior knows one posture only")
 
+
+OTHER_SIDE = {"left_": "right_", "right_": "left_"}
+
+
+def mirrored(table: JointTable) -> JointTable:
+    """The motion mirrored at the world's X axis: left and right change places, y changes its sign.
+
+    Raises `ShadowPuppetError` if a joint of one side has no counterpart.
+    """
+    names = tuple(_other_side(name) for name in table.names)
+    alone = [name for name, other in zip(table.names, names, strict=True) if other not in table.names]
+    if alone:
+        raise ShadowPuppetError(f"joint {alone[0]!r}: found no {_other_side(alone[0])!r} beside it, which a mirror needs")
+    reflected = table.positions * (1, -1, 1)
+    return JointTable(table.times, table.names, reflected[:, [table.names.index(name) for name in names]])
+
+
+def without_gaps(values: ArrayLike, shortest: int = 2) -> list[Array]:
+    """The runs of frames of a clip (T, D) without missing numbers, each of `shortest` frames or more."""
+    values = np.asarray(values, float)
+    return [values[start:end] for start, end in true_runs(np.isfinite(values).reshape(len(values), -1).all(1)) if end - start >= shortest]
+
+
+def _other_side(name: str) -> str:
+    for side, other in OTHER_SIDE.items():
+        if name.startswith(side):
+            return other + name.removeprefix(side)
+    return name

@@ -21,8 +21,6 @@ DARK, BRIGHT = 40, 245
 """Grey levels between which a pixel shows the gain: below, it is noise; above, it may be clipped."""
 MIN_SHARE = 0.25
 """Least share of such pixels in a channel whose own gain is estimated."""
-CLIPPED = 255
-"""Grey level at which a camera's pixels are clipped."""
 BINS, BIN = 512, 0.008
 """Histogram of log gains: number and width of bins, the middle one at a gain of 1."""
 WINDOW = 15
@@ -140,7 +138,7 @@ class Light:
         if surface is not None:
             nodes = (np.exp(-(NODE_TERMS @ surface)) / gains).astype(np.float32).reshape(NODES, NODES, -1)
             factors = np.asarray(cv2.resize(nodes, (image.shape[1], NODES), interpolation=cv2.INTER_LINEAR), np.float32)
-        clips, out = bool(CLIPPED * factors.min() < self.scene.max()), np.empty(image.shape, np.uint8)
+        clips, out = bool(255 * factors.min() < self.scene.max()), np.empty(image.shape, np.uint8)
         before, scene, factors, after = (each.reshape(len(each), -1) for each in (np.ascontiguousarray(image), self.scene, factors, out))
         divided(before, scene, factors, clips, after)
         return out

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette.background import Floats, Image, check_alike, check_image, smoothed, to_planes
 from shadowpuppet.silhouette.correction.light import Light
-from shadowpuppet.silhouette.recovery.filling import filled
 from shadowpuppet.silhouette.recovery.modes import radius_of, ranked
 from shadowpuppet.silhouette.recovery.movement import Mask, Movement, find_movement, unsteady
 from shadowpuppet.silhouette.recovery.separation import separate
@@ -140,3 +140,38 @@ class _Sums:
         import cv2
 
         cv2.accumulate(image, self.first, mask=mask)
+
+
+SMALLEST = 2
+"""Least side, pixels, of a level of the pyramid."""
+
+
+def filled(picture: Floats, known: NDArray[np.bool_]) -> Floats:
+    """The picture (H, W, C) or (H, W) with its unknown pixels filled by ever wider means of the known ones (push and pull in a pyramid).
+
+    known: of shape (H, W); the known pixels stay as they are.
+    """
+    import cv2
+
+    weight = known.astype(np.float32)
+    if known.all() or not known.any():
+        return picture
+    levels = [(_weighted(picture, weight), weight)]
+    while min(weight.shape) > SMALLEST and (weight < 1e-3).any():
+        levels.append((np.asarray(cv2.pyrDown(levels[-1][0]), np.float32), np.asarray(cv2.pyrDown(weight), np.float32)))
+        weight = levels[-1][1]
+    values = _divided(*levels[-1])
+    for sums, weight in reversed(levels[:-1]):
+        coarse = np.asarray(cv2.pyrUp(values, dstsize=weight.shape[::-1]), np.float32)
+        share = np.minimum(weight, 1)
+        values = _weighted(_divided(sums, weight), share) + _weighted(coarse, 1 - share)
+    return np.where(known if picture.ndim == 2 else known[..., None], picture, values)
+
+
+def _weighted(picture: Floats, weight: Floats) -> Floats:
+    return picture * (weight if picture.ndim == 2 else weight[..., None])
+
+
+def _divided(sums: Floats, weight: Floats) -> Floats:
+    weight = np.maximum(weight, 1e-6)
+    return sums / (weight if sums.ndim == 2 else weight[..., None])

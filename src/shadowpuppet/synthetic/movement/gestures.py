@@ -49,8 +49,8 @@ def without_side(channel: str) -> str:
 Posture = dict[str, float]
 Keys = list[tuple[float, Posture]]
 
-LEAD_SECONDS, TAIL_SECONDS = 0.8, 0.8
-"""Seconds of standing before the first gesture and for lowering the arms after the last."""
+PAUSE_SECONDS = 0.8
+"""Seconds of standing before the first gesture, and for lowering the arms after the last."""
 
 
 def both(**degrees: float) -> Posture:
@@ -226,19 +226,19 @@ GESTURES: dict[str, Callable[[float, np.random.Generator], Keys]] = {
 def gesture_postures(gestures: Sequence[tuple[str, float]], t: Array, rng: np.random.Generator, still: float = 1.0) -> Array:
     """Postures (T, `CHANNELS`) at times `t` (s) of gestures `(name, seconds)` one after another.
 
-    Key postures are joined by shape-preserving cubics and smoothed. The person stands `LEAD_SECONDS` before the first gesture and lowers
-    the arms in the `TAIL_SECONDS` after the last. still: factor on involuntary motion.
+    Key postures are joined by shape-preserving cubics and smoothed. The person stands `PAUSE_SECONDS` before the first gesture and lowers
+    the arms in the `PAUSE_SECONDS` after the last. still: factor on involuntary motion.
     """
     return clamp_joints(interpolate_keys(key_postures(gestures, rng), t) + still * involuntary_motion(t, rng))
 
 
 def key_postures(gestures: Sequence[tuple[str, float]], rng: np.random.Generator) -> Keys:
     """Key postures of gestures `(name, seconds)` one after another, standing before and after."""
-    begin, keys = LEAD_SECONDS, [(0.0, {}), (0.5 * LEAD_SECONDS, {})]
+    begin, keys = PAUSE_SECONDS, [(0.0, {}), (0.5 * PAUSE_SECONDS, {})]
     for name, seconds in gestures:
         keys += [(begin + when, posture) for when, posture in GESTURES[name](seconds, rng)]
         begin += seconds
-    return [*keys, (begin + TAIL_SECONDS, {}), (begin + TAIL_SECONDS + 1, {})]
+    return [*keys, (begin + PAUSE_SECONDS, {}), (begin + PAUSE_SECONDS + 1, {})]
 
 
 def interpolate_keys(keys: Keys, t: Array, names: Sequence[str] = CHANNELS, rounding: float = 0.16) -> Array:
@@ -276,7 +276,7 @@ def clamp_joints(postures: Array) -> Array:
 
 def duration(gestures: Sequence[tuple[str, float]]) -> float:
     """Seconds from the first to the last frame of gestures `(name, seconds)`."""
-    return LEAD_SECONDS + sum(seconds for _, seconds in gestures) + TAIL_SECONDS
+    return PAUSE_SECONDS + sum(seconds for _, seconds in gestures) + PAUSE_SECONDS
 
 
 def posture(**named: float) -> Array:

@@ -13,7 +13,7 @@ from shadowpuppet.synthetic.movement.gait import PathWalk
 from shadowpuppet.synthetic.movement.gait_cycle import smoothstep
 from shadowpuppet.synthetic.movement.gestures import (
     GESTURES,
-    LEAD_SECONDS,
+    PAUSE_SECONDS,
     clamp_joints,
     duration,
     gesture_postures,
@@ -54,7 +54,7 @@ class PlantedGestures:
 
     def at(self, t: Array) -> tuple[Array, LegPlacement]:
         """As `MotionPart.at`."""
-        postures = interpolate_keys(self.keys, np.clip(t + LEAD_SECONDS, 0, None))
+        postures = interpolate_keys(self.keys, np.clip(t + PAUSE_SECONDS, 0, None))
         return postures, planted_stance(self.body, postures)
 
 
@@ -77,7 +77,7 @@ def sequence_seconds(gestures: Sequence[Gesture]) -> float:
 
 def animate(body: Mannequin, gestures: Sequence[Gesture], t: Array, rng: np.random.Generator, still: float = 1.0, turn: float = 0.0,
             posture: PostureName = "standing") -> PosedBody:
-    """The figure of `body` at times `t` (T,), s; it stands for `LEAD_SECONDS` before the first of `gestures`.
+    """The figure of `body` at times `t` (T,), s; it stands for `PAUSE_SECONDS` before the first of `gestures`.
 
     still: factor on sway and tremor. turn: initial heading, rad to the left of -Y. The area covered in walking is centred at the origin.
     posture: the one in which the person performs gestures of arms and trunk; all other motions begin and end standing.
@@ -105,7 +105,7 @@ def animate(body: Mannequin, gestures: Sequence[Gesture], t: Array, rng: np.rand
 
 def _middle(parts: Sequence[MotionPart], turn: float) -> Array:
     """The middle (3,) of the area that the person covers in the whole motion."""
-    whole = np.arange(0, LEAD_SECONDS + sum(part.seconds for part in parts), 0.05)
+    whole = np.arange(0, PAUSE_SECONDS + sum(part.seconds for part in parts), 0.05)
     places = _joined(parts, whole, turn)[1].pelvis[:, :2]
     return np.append((places.max(0) + places.min(0)) / 2, 0.0)
 
@@ -131,7 +131,7 @@ def _parts(body: Mannequin, gestures: Sequence[Gesture], rng: np.random.Generato
 
 def _joined(parts: Sequence[MotionPart], t: Array, turn: float) -> tuple[Array, LegPlacement]:
     """Postures and stance of `parts`, each starting where the one before ended, with trunk and arms blended."""
-    begin, place = LEAD_SECONDS, FloorPose(turn=turn)
+    begin, place = PAUSE_SECONDS, FloorPose(turn=turn)
     postures, pieces, of = np.zeros((len(t), len(CHANNELS))), [], np.zeros(len(t), int)
     for n, part in enumerate(parts):
         end = begin + part.seconds
