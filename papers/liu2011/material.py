@@ -30,7 +30,7 @@ from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.synthesize import make_recording
 from shadowpuppet.synthetic import Mannequin, Scene, Spec, Viewpoint, read_spec
-from shadowpuppet.synthetic.movement.gestures import LEAD_SECONDS
+from shadowpuppet.synthetic.movement.gestures import PAUSE_SECONDS
 from shadowpuppet.synthetic.spec_changes import parse_gestures
 from shadowpuppet.synthetic.spec_file import SPEC_FILE
 from shadowpuppet.threads import one_blas_thread
@@ -185,6 +185,6 @@ def _parts(folder: Path, times: Array) -> tuple[Part, ...]:
     except SettingsError:
         ends = np.linspace(times[0], times[-1], 4).tolist()
         return tuple(Part(f"{nth} third", *span) for nth, span in zip(("first", "second", "last"), pairwise(ends)))
-    ends = (LEAD_SECONDS + np.cumsum([0, *(gesture.seconds for gesture in gestures)])).tolist()
+    ends = (PAUSE_SECONDS + np.cumsum([0, *(gesture.seconds for gesture in gestures)])).tolist()
     names = [gesture.motion.replace("_", " ") for gesture in gestures]
     return tuple(Part(name, start, end) for name, start, end in zip(names, [times[0], *ends[1:]], [*ends[1:-1], times[-1]]))

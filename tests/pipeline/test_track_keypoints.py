@@ -93,6 +93,19 @@ def test_a_look_says_what_detectors_found_and_needs_no_pictures_of_the_scene(wal
     assert {camera.background for camera in look.cameras} == {"none, keypoints alone"}
 
 
+def test_one_cameras_scale_is_a_guess_without_a_height(walk):
+    unknown, known = (look_at(walk, make_options(BY_KEYPOINTS | {"camera": "cam1"} | given)) for given in ({}, {"height": 1.75}))
+    assert [each.short for each in unknown.findings] == ["height not known: all lengths are guesses; give --height"]
+    assert not known.findings
+
+
+def test_keypoints_that_one_cameras_silhouettes_do_without_are_named(rig_recording, walk, tmp_path):
+    both = made.copied(walk, tmp_path / "both")
+    made.copied(rig_recording / "background", both / "background")
+    found = look_at(both, make_options({"camera": "cam1", "height": 1.75}))
+    assert "keypoints not used: try --evidence keypoints" in [each.short for each in found.findings]
+
+
 def test_a_wrong_scale_is_said_and_a_hopeless_one_refused(rig_recording, walk, tmp_path):
     large = with_keypoints(rig_recording, tmp_path / "large", 1.25)
     told = [each.short for each in look_at(large, make_options(BY_KEYPOINTS | {"height": 1.75})).findings]

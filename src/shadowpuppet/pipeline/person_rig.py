@@ -180,7 +180,8 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
         seen = _seen_height(rng, cameras, first, settings) if height is None else None
         tall, begin = (height or AVERAGE_HEIGHT, 0) if seen is None else seen
         sizes = dressed(average_sizes(settings.body, tall))
-        source = f"{'the height' if height else f'a height of {tall:.2f} m as seen'}, and the {shown} of the first seconds"
+        scale = "the height" if height else f"an average height of {tall:.2f} m" if seen is None else f"a height of {tall:.2f} m as seen"
+        source = f"{scale}, and the {shown} of the first seconds"
         assert isinstance(sizes, BoneSizes)
         spread = Deviations(size_deviations(sizes, shown=False), None if height else shared_deviations(sizes))
         if len(cameras) == 1:  # which shows proportions only

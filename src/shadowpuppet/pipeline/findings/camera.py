@@ -115,8 +115,7 @@ def _doubts(look: Look, footage: Footage) -> list[Finding]:
                                  "{upright:.0f} from left to right; with a wrong one all depths are wrong; give --fov {upright:.0f}",
                                  "upright film: --fov of a phone is then about {upright:.0f}", NOTED, fov=look.fov, upright=UPRIGHT))
     if subject.height is None and subject.distance is None:
-        doubts.append(Finding(f"neither height nor distance is known: the {look.scale}, and all lengths are as wrong as that is; give "
-                              "--height", "height not known: all lengths are guesses; give --height", HARMFUL))
+        doubts.append(unknown_scale(look.scale))
     elif subject.distance is None and not footage.recording.references:
         doubts.append(Finding("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as "
                               "wrong as that; measure it and give --distance, or take references",
@@ -129,6 +128,12 @@ def _doubts(look: Look, footage: Footage) -> list[Finding]:
         doubts.append(Finding.of("the time from frame to frame varies by {percent:.0f} %: the film's own times are kept",
                                  "frames come unevenly: their own times are kept", NOTED, percent=100 * look.jitter * look.rate))
     return [*doubts, *unlike_ready(look.exact_overlap), *condition_cautions(look.condition, footage.view.background is None)]
+
+
+def unknown_scale(scale: str) -> Finding:
+    """The doubt about one camera's film of a person of unknown height and distance; `scale`: as `known_scale`."""
+    return Finding(f"neither height nor distance is known: the {scale}, and all lengths are as wrong as that is; give --height",
+                   "height not known: all lengths are guesses; give --height", HARMFUL)
 
 
 def _share(masks: Sequence[Mask]) -> float:

@@ -13,6 +13,7 @@ from shadowpuppet.calibration.agreement import MAX_DISAGREEMENT, Agreement
 from shadowpuppet.camera.keypoints import Keypoints, cameras_with_persons
 from shadowpuppet.errors import RUINOUS, Finding
 from shadowpuppet.geometry import evenly_spread
+from shadowpuppet.pipeline.findings.camera import known_scale, unknown_scale
 from shadowpuppet.pipeline.findings.cautions import film_cautions
 from shadowpuppet.pipeline.findings.keypoints import look_at_keypoints
 from shadowpuppet.pipeline.findings.look import CameraLook, RigLook, Survey
@@ -52,6 +53,8 @@ def survey_keypoints(rig: Rig, options: Options, listener: Listener | None = Non
     scale = _scale(rig, seen, options)
     refusal = scale.caution().words if scale is not None and not HEIGHTS[0] < scale.height < HEIGHTS[1] else None
     findings = [each.about(f"camera {footage.camera.name!r}") for footage in rig.footage for each in film_cautions(footage)]
+    if len(rig.footage) == 1 and rig.recording.subject.height is None and rig.recording.subject.distance is None:
+        findings.insert(0, unknown_scale(known_scale(rig.footage[0])))
     if scale is not None:
         findings.insert(0, scale.caution())
     elif found is not None and found.apart is not None and found.apart > NEAR:
