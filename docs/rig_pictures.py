@@ -35,7 +35,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.speed import naive_multi as naive
 
 ASSETS = Path(__file__).parent / "assets"
-FRAME, TIMES = 34, (0.3, 0.55)
+FRAME, SHARE = 34, 0.3
 """Index of the frame, and the times of the overlay frames as shares of the film."""
 LARGE, GREYS, PAPER = 3, 6, 235
 """Magnification; quantisation step of the grey levels; background of drawings."""
@@ -180,11 +180,10 @@ def striding(body: Body) -> dict[str, float]:
     return named | {name: angle for name, angle in turns.items() if name in body.skeleton.dof_names}
 
 
-def overlays(folder: Path) -> np.ndarray:
-    """Two frames of the overlay film."""
+def overlay(folder: Path) -> np.ndarray:
+    """A frame of the overlay film."""
     frames = list(open_frames(folder / "run-ring" / "overlay.mp4"))
-    sheet = np.concatenate([frames[round(share * len(frames))].image for share in TIMES], axis=1)
-    return np.asarray(cv2.bilateralFilter(sheet, 7, 30, 3) // GREYS * GREYS, np.uint8)
+    return np.asarray(cv2.bilateralFilter(frames[round(SHARE * len(frames))].image, 7, 30, 3) // GREYS * GREYS, np.uint8)
 
 
 def cropped(image: np.ndarray, camera: Camera, points: Array, margin: int = 85) -> np.ndarray:
@@ -207,7 +206,7 @@ def main() -> None:
         if len(sys.argv) < 2:
             run_demo(folder, Options(overlay=True))
         found = scene(folder)
-        pictures = {"several": overlays(folder), "hull": hull(found), "parts": parts(found), "forces": forces(found), "bodies": bodies()}
+        pictures = {"several": overlay(folder), "hull": hull(found), "parts": parts(found), "forces": forces(found), "bodies": bodies()}
     for name, image in pictures.items():
         write_image(ASSETS / f"{name}.png", image)
         print(f"{ASSETS / name}.png: {(ASSETS / f'{name}.png').stat().st_size} bytes")
