@@ -36,7 +36,7 @@ from benchmarks.speed import naive_multi as naive
 
 ASSETS = Path(__file__).parent / "assets"
 FRAME, SHARE = 34, 0.3
-"""Index of the frame, and the times of the overlay frames as shares of the film."""
+"""Index of the frame of points and parts, and the share of the film before the overlay's."""
 LARGE, GREYS, PAPER = 3, 6, 235
 """Magnification; quantisation step of the grey levels; background of drawings."""
 NORMAL, NEAREST = 0.045, 2.0
