@@ -4,7 +4,7 @@
     python benchmarks/multiview.py --set proving
     python benchmarks/multiview.py --tables
 
-`--set measured`: walking, jogging and boxing of the shared recordings; `shares` has the rows that say where the error comes from;
+`--set measured`: walking, jogging and boxing of the shared recordings; `--rows` has rows that say where the error comes from;
 `proving` is the proving ground (`synthetic.proving_rings`), made in build/rings where it is missing, a quarter of an hour on one core.
 Each run (recording, row, seed) is what `shadowpuppet track` does, from film to joints.csv, and leaves its measures in
 build/multiview/results: what is there is not run again, unless `--again`, so that parts can be run alone. The tables are made of all that
@@ -91,7 +91,6 @@ ROWS: dict[str, Row] = {
 """What can be run; which of them a set has is in `SETS`."""
 SETS: dict[str, tuple[str, ...]] = {
     "measured": tuple(name for name in ROWS if name.startswith(("default", "ni2008"))),
-    "shares": ("default", "exact masks", "true bones and first pose", "exact masks, true bones and first pose", "forces", "cylinders"),
     "proving": ("default", "default, no training motion", "exact masks", "ni2008"),
 }
 
@@ -259,7 +258,7 @@ def write_tables(folder: Path, page: Path) -> None:
     """Put the tables of all measures between their markers in the page; prints them, too."""
     found, text = results(folder), page.read_text("utf-8")
     tables = {"measured": by_recording(found, MEASURED, SETS["measured"]), "joints": by_joint(found, MEASURED),
-              "shares": by_recording(found, MEASURED, SETS["shares"]), "proving": proving(found, SETS["proving"])}
+              "proving": proving(found, SETS["proving"])}
     for name, table in tables.items():
         if not re.search(r"\d\.\d", table):  # nothing of it was run: what stands there stays
             continue
