@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.conventions import BEND, Convention, conventions
 from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import AXES, BONES
 from shadowpuppet.geometry import Array
-from shadowpuppet.io.angle_conventions import HEIGHT
 
 TARGET = Path(__file__).parent / "assets" / "angles.png"
 TURN = np.radians(35)
@@ -55,7 +55,7 @@ def _bones(axes: Any, body: Body, places: Array, colour: str, chosen: Array | No
 
 def main() -> None:
     """Write the picture."""
-    body = make_body("anatomical", average_sizes("anatomical", HEIGHT))
+    body = make_body("anatomical", average_sizes("anatomical", AVERAGE_HEIGHT))
     shown = [(d, each) for d, each in enumerate(conventions(body))
              if each.dof.kind != "translation" and not each.dof.name.startswith("right_")]  # fmt: skip
     rows = -(-len(shown) // COLUMNS)
