@@ -118,6 +118,8 @@ def test_a_wrong_scale_is_said_and_a_hopeless_one_refused(rig_recording, walk, t
 def test_what_cannot_be_is_refused(rig_recording, walk, tmp_path):
     with pytest.raises(RecordingError, match="no keypoints of camera 'cam1' in it"):
         track_recording(rig_recording, tmp_path / "run", make_options(BY_KEYPOINTS))
+    with pytest.raises(TrackingError, match="nobody is found"):
+        track_recording(walk, tmp_path / "run", make_options({"evidence": "keypoints", "multiview": {"keypoints": 0}}))
     empty = with_keypoints(rig_recording, tmp_path / "empty", frames=0)
     with pytest.raises(TrackingError, match="the detector found no person in two cameras at the same time"):
         track_recording(empty, tmp_path / "run", make_options(BY_KEYPOINTS))

@@ -185,7 +185,7 @@ def _without_cameras(aside: Sequence[SetAside], frames: int) -> Iterator[Finding
 
 
 def _losses(motion: Motion) -> Iterator[Finding]:
-    """A reason if nobody was seen, or the person was often lost."""
+    """A reason if no frame shows a person, or many lose the person."""
     if not (motion.status != "absent").any():
         yield Finding("nobody was seen in any frame", "nobody was seen: film the empty scene and the person", RUINOUS)
     elif (lost := lost_share(motion)) > OFTEN_LOST:
@@ -202,8 +202,9 @@ def _wide(lengths: Array, kind: int, words: str) -> Iterator[Finding]:
 
 def _doubtful_limbs(motion: Motion, kind: int, lengths: Array, limbs: Sequence[str]) -> Iterator[Finding]:
     """A reason for limbs that are often doubtful, and one for others that are at times, with expected errors (T, J) of the joints, m."""
-    doubtful = dict(zip(motion.limbs, np.isin(motion.limb_status, DOUBTFUL).mean(0).tolist() if len(motion) else (), strict=False))
-    shares = {limb: doubtful[limb] for limb in limbs if limb in doubtful}
+    if not len(motion):
+        return
+    shares = {limb: float(np.isin(motion.limb_status[:, motion.limbs.index(limb)], DOUBTFUL).mean()) for limb in limbs}
     errors = {limb: _mean_error(lengths[:, joints]) for limb, joints in joints_of_limbs(motion.joint_names).items()}
     often = [limb for limb, share in shares.items() if share > OFTEN_DOUBTFUL[kind] and not errors[limb] <= WIDE_LIMB[kind]]
     at_times = [limb for limb, share in shares.items() if share > OFTEN_LOST and limb not in often]

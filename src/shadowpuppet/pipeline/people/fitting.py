@@ -36,11 +36,13 @@ def fit_apart(rng: np.random.Generator, floor: Floor, options: Options, rate: fl
     """The sizes of one person, fitted to frame sets; `rate`: frames/s; `shown`: keypoints, by camera, of some of their times. A person who
     is not seen apart in enough views has the average sizes for the figure's height."""
     cameras, tall = floor.cameras, float(np.clip(Followed(tuple(seen)).height, *TALL))
-    views = [views_of(floor, each.figure, each.others, each.masks) for each in seen]
-    found = [tuple(None if mask is None else own for mask, own in zip(view, shown.get(each.time, ()))) for view, each in zip(views, seen)]
-    if not options.uses_silhouettes:
-        views, found = [each.masks for each in seen], [chosen_of(shown.get(each.time, ()), each.figure.people) for each in seen]
-    shows = [view if options.uses_silhouettes else own for view, own in zip(views, found)]
+    keypoints = [shown.get(each.time, ()) for each in seen]
+    if options.uses_silhouettes:
+        shows = views = [views_of(floor, each.figure, each.others, each.masks) for each in seen]
+        found = [tuple(None if mask is None else own for mask, own in zip(view, each)) for view, each in zip(views, keypoints)]
+    else:
+        views = [each.masks for each in seen]
+        shows = found = [chosen_of(own, each.figure.people) for own, each in zip(keypoints, seen)]
     apart = [n for n, view in enumerate(shows) if sum(each is not None for each in view) >= min(VIEWS, len(cameras))]
     subject = None
     if len(apart) >= min(MIN_FRAMES, len(seen)):

@@ -166,8 +166,8 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
     """
     first = first_frames(first)
     plain, prior = replace(settings, method="hybrid", refinement="gauss_newton"), Deviations.of(spread)
-    silhouettes = any(mask is not None for each in first for mask in each.masks)
-    worth = INDEPENDENT_POINTS[settings.body] if silhouettes else POINT_NOISE**2 / settings.keypoints  # a nat counts as one
+    alone = settings.keypoints > 0 and all(mask is None for each in first for mask in each.masks)
+    worth = POINT_NOISE**2 / settings.keypoints if alone else INDEPENDENT_POINTS[settings.body]  # a nat of keypoints counts as one
 
     def followed(rng: np.random.Generator, sizes: Measured, facing: float | None) -> tuple[MultiviewTracker, list[Found]]:
         tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)

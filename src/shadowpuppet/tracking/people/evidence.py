@@ -103,7 +103,8 @@ def chosen_of(keypoints: Sequence[Keypoints | None], people: People) -> tuple[Ke
 def other_keypoints(tracker: MultiviewTracker, drawn: Mapping[int, Drawn],
                     keypoints: Sequence[Keypoints | None]) -> tuple[Keypoints | None, ...]:
     """The keypoints, one per camera, in which nothing is known of the people who are `drawn`; else as `own_keypoints`."""
-    taken = zip(*_chosen(tracker, drawn, keypoints).values()) if drawn and cameras_with_persons(keypoints) else [()] * len(keypoints)
+    chosen = _chosen(tracker, drawn, keypoints)
+    taken = zip(*chosen.values()) if chosen else [()] * len(keypoints)
     return tuple(None if each is None else each.without(person for person in people if person is not None)
                  for each, people in zip(keypoints, taken))
 

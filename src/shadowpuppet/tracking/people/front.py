@@ -89,7 +89,7 @@ class Front(NamedTuple):
         return self._replace(odds=float(np.clip(odds, -MOST, MOST)), steps=(*steps, step)), False
 
     def told(self, odds: float) -> Front:
-        """The front after keypoints told log odds for the way that the body faces."""
+        """The front with log odds added that keypoints give for the heading of the body."""
         return self._replace(odds=float(np.clip(self.odds + odds, -MOST, MOST)))
 
     def _faded(self, step: Step) -> float:
