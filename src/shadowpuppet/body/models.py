@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
-from shadowpuppet.body.anthropometry import ANATOMICAL_SHARES, CYLINDER_SHARES, PROPORTIONS, SOLE, stature_of
+from shadowpuppet.body.anthropometry import ANATOMICAL_SHARES, AVERAGE_HEIGHT, CYLINDER_SHARES, PROPORTIONS, SOLE, stature_of
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import AnatomicalSizes, BoneSizes, CardboxSizes, CylinderSizes, Sizes
 from shadowpuppet.body.upper_body import HAND_SHARE, WRIST_SHARE, boxes, cardbox, cardbox_bends, rounded
@@ -109,3 +109,8 @@ def whole_from_upper(name: str, sizes: CardboxSizes, height: float) -> BoneSizes
         ratio = min(max(getattr(sizes, upper) / (PROPORTIONS[upper][0] * stature), MIN_STOUTNESS), MAX_STOUTNESS)
         known |= {width: ratio * shares_of(kind)[width][0] * stature for width in widths if width in kind.names()}
     return whole_sizes_from_bones(kind, known, stature)
+
+
+def average_body(name: str) -> Body:
+    """A body model of average sizes, used before the person's sizes are known."""
+    return make_body(name, average_sizes(name, AVERAGE_HEIGHT))

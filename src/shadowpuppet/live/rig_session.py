@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from shadowpuppet.body.models import average_body
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import colour_codes
 from shadowpuppet.camera.mask import Seen, may_be_person
@@ -28,7 +29,7 @@ from shadowpuppet.pipeline.overlay_video import overlay_grid
 from shadowpuppet.pipeline.person_rig import HullObservation, MultiviewSubject, check_body, fit_in_views
 from shadowpuppet.pipeline.rig import FrameSet, Segment, shown_in
 from shadowpuppet.pipeline.silhouettes import Silhouettes
-from shadowpuppet.pipeline.subject import TrackedSubject, average_body
+from shadowpuppet.pipeline.subject import TrackedSubject
 from shadowpuppet.tracking.doubt.multiview import Before
 from shadowpuppet.tracking.frozen import LEAST
 from shadowpuppet.tracking.multiview.tracker import MultiviewState

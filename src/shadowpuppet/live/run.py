@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from shadowpuppet.body.models import average_body
 from shadowpuppet.errors import SettingsError
 from shadowpuppet.io.calibration.calibration_files import write_calibration
 from shadowpuppet.io.inputs.inputs import inputs_of
@@ -36,7 +37,7 @@ from shadowpuppet.live.watchdog import CameraWatchdog
 from shadowpuppet.motion.metrics import evaluate
 from shadowpuppet.pipeline.options import PATHS, Options, plain_options
 from shadowpuppet.pipeline.stages.smooth import smooth_run
-from shadowpuppet.pipeline.subject import FittedPerson, average_body, joint_names
+from shadowpuppet.pipeline.subject import FittedPerson, joint_names
 from shadowpuppet.settings import validate
 from shadowpuppet.threads import one_blas_thread
 from shadowpuppet.video.capture import CameraCapture

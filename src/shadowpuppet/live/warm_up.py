@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.body.models import average_sizes
+from shadowpuppet.body.models import average_body, average_sizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.pipeline.options import Options
-from shadowpuppet.pipeline.subject import average_body
 from shadowpuppet.silhouette import learn_background
 from shadowpuppet.tracking.monocular.initialization import find_person
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate

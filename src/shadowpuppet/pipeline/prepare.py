@@ -10,6 +10,7 @@ from typing import Generic, NamedTuple
 
 import numpy as np
 
+from shadowpuppet.body.models import average_body
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.io.inputs.inputs import Resuming
 from shadowpuppet.io.person import read_person, write_person
@@ -26,7 +27,7 @@ from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.progress import STAGES, Listener, generators
 from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.pipeline.silhouette_cache import SilhouetteCache
-from shadowpuppet.pipeline.subject import Before, FittedPerson, Observation, State, TrackedSubject, average_body, joint_names
+from shadowpuppet.pipeline.subject import Before, FittedPerson, Observation, State, TrackedSubject, joint_names
 from shadowpuppet.threads import one_blas_thread
 
 LOOKS_AGAIN = 3

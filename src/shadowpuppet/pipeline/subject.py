@@ -12,7 +12,6 @@ from typing import ClassVar, Generic, NamedTuple, Protocol, Self, TypeVar
 import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.body.models import average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.camera.bits import Bits
@@ -185,11 +184,6 @@ def motion_frame(subject: TrackedSubject[State, Observation, Before], seconds: f
 def joint_names(body: Body) -> list[str]:
     """Names of the landmarks that a run writes as joints."""
     return [landmark for landmark in body.landmark_names if not landmark.endswith("_fist")]
-
-
-def average_body(name: str) -> Body:
-    """A body model of average sizes, used before the person's sizes are known."""
-    return make_body(name, average_sizes(name, AVERAGE_HEIGHT))
 
 
 def floor_entry(motion: Motion, cameras: Sequence[Camera], person: Person) -> dict[str, dict[str, float | str]]:

@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shadowpuppet.body.models import MODELS
+from shadowpuppet.body.models import MODELS, average_body
 from shadowpuppet.motion.limbs import LIMBS, limb_of, limbs_of
-from shadowpuppet.pipeline.subject import average_body
 from shadowpuppet.tracking.doubt.doubt import UNSEEN, Evidence, limb_statuses, pose_deviations
 from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of, lever_of, limb_of_part
 from shadowpuppet.tracking.doubt.steps import STILL_ALLOWED, Trail, stillness, surprise

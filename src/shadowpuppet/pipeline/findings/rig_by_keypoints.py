@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
+from shadowpuppet.body.models import average_body
 from shadowpuppet.body.sizes import HEIGHTS
 from shadowpuppet.calibration.agreement import MAX_DISAGREEMENT, Agreement
 from shadowpuppet.camera.keypoints import Keypoints, cameras_with_persons
@@ -24,7 +25,6 @@ from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.people.census import census_by_keypoints, people_finding
 from shadowpuppet.pipeline.progress import Listener, Steps
 from shadowpuppet.pipeline.rig import Rig
-from shadowpuppet.pipeline.subject import average_body
 from shadowpuppet.silhouette.quality import mask_quality
 from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.keypoints.sights import NEAR

@@ -14,9 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.body.models import average_sizes, make_body
-from shadowpuppet.body.shapes import Body
+from shadowpuppet.body.models import average_body
 from shadowpuppet.body.sizes import HEIGHTS as PEOPLE
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.keypoints import Keypoints
@@ -25,7 +23,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
 from shadowpuppet.threads import usable_cores
 from shadowpuppet.tracking.keypoints.choice import APART, People, people_between
-from shadowpuppet.tracking.keypoints.definitions import landmarks_of
+from shadowpuppet.tracking.keypoints.definitions import Landmarks, landmarks_of
 from shadowpuppet.tracking.keypoints.stature import height_between
 from shadowpuppet.tracking.people.floor import ASIDE, HEIGHTS, LEGS, TRUNK, Floor, Ground, figure_points, floor_under, pixel_index
 
@@ -98,7 +96,7 @@ def find_people(floor: Floor, seen: Seen, explained: Sequence[Mask | None] = ())
 
 def _find_by_keypoints(cameras: Sequence[Camera], keypoints: Sequence[Keypoints | None]) -> list[Figure]:
     """The people whose keypoints' rays meet, of a person's height, each in a place of their own."""
-    found, landmarks = list[Figure](), landmarks_of(_average_body())
+    found, landmarks = list[Figure](), _landmarks()
     for people, places in people_between(cameras, keypoints, landmarks) if keypoints else ():
         height, place = height_between([places], landmarks), np.nanmean(places[:, :2], axis=0)
         alone = all(np.linalg.norm(place - other.place) >= APART for other in found)
@@ -108,8 +106,8 @@ def _find_by_keypoints(cameras: Sequence[Camera], keypoints: Sequence[Keypoints 
 
 
 @cache
-def _average_body() -> Body:
-    return make_body("anatomical", average_sizes("anatomical", AVERAGE_HEIGHT))
+def _landmarks() -> Landmarks:
+    return landmarks_of(average_body("anatomical"))
 
 
 def _without_ghosts(floor: Floor, seen: Seen, explained: Sequence[Mask | None], found: list[Figure]) -> list[Figure]:
