@@ -6,6 +6,7 @@ each method; a new one is a classifier here and its line there (and a word in th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shadowpuppet.camera.mask import Window
 from shadowpuppet.errors import SilhouetteError
 from shadowpuppet.silhouette.background import (
     SMOOTHING,
@@ -39,6 +41,9 @@ CERTAIN_FACTOR = 2.0
 ROUNDING_MARGIN = 1 - 1e-4
 """Factor on a threshold that keeps it on the safe side of single precision."""
 
+CELL, SPECK, AROUND = 4, 2, 0.25
+"""Side (pixels) of the cells whose means show where a frame differs; most cells of a speck, which may lie anywhere; and the margin about the
+others, as a share of their box."""
 EDGE_JITTER = 0.05
 """Standard deviation added at the background's edges, over the change of its value across a pixel: cameras shake."""
 
@@ -71,14 +76,20 @@ class ChannelClassifier:
         pixel counts as shadow."""
         from shadowpuppet.silhouette.shadows import MAX_SHADE, MAYBE_SHADOW, resolve_shadows
 
-        resolved = self.darkest < 1 and SHADOW_CHANNELS[self.key][0] > 0
-        smooth = smoothed(to_planes(image), self.smoothing)
-        label = self.labels(smooth, MAX_SHADE if resolved else 0.0)
-        if not resolved:
-            return label, None
-        either = label == MAYBE_SHADOW
-        label = resolve_shadows(label, smooth, self.mean, self.inverse_sigma)
-        return label, either & (label == 0)
+        resolved, window = self.darkest < 1 and SHADOW_CHANNELS[self.key][0] > 0, self.different(image)
+        out, shadow = np.zeros(image.shape[:2], np.uint8), np.zeros(image.shape[:2], bool) if resolved else None
+        if not (inner := image[window]).size:
+            return out, shadow
+        if inner.size > image.size / 2:  # little is saved
+            inner, window = image, (slice(None), slice(None))
+        smooth, part = smoothed(to_planes(inner), self.smoothing), self.within(window)
+        label = part.labels(smooth, MAX_SHADE if resolved else 0.0)
+        if shadow is not None:
+            either = label == MAYBE_SHADOW
+            label = resolve_shadows(label, smooth, part.mean, part.inverse_sigma)
+            shadow[window] = either & (label == 0)
+        out[window] = label
+        return out, shadow
 
     def labels(self, planes: Image, asked: float = 0.0) -> Labels:
         """Labels (H, W) of smoothed Y, Cr, Cb (H, W, 3), pixel by pixel.
@@ -96,6 +107,37 @@ class ChannelClassifier:
                  label)
         return label
 
+    def different(self, image: Image) -> Window:
+        """Rows and columns of a picture (H, W, 3) or (H, W) beyond which it is background but for specks of one or two cells: the mean of
+        no other cell of pixels there differs from it."""
+        import cv2
+
+        if min(image.shape[:2]) < CELL:
+            return slice(None), slice(None)
+        differ = ~np.asarray(cv2.inRange(to_planes(means_of_cells(image)), *self._background_of_cells), np.uint8)
+        left, top, width, height, area = cv2.connectedComponentsWithStats(differ)[2][1:].T
+        if not (large := area > SPECK).any():
+            return slice(0), slice(0)
+        return _around(top[large], height[large]), _around(left[large], width[large])
+
+    def within(self, window: Window) -> ChannelClassifier:
+        """The classifier of a window of rows and columns of pictures."""
+        if window == (slice(None), slice(None)):
+            return self
+        part = replace(self, mean=np.ascontiguousarray(self.mean[window]), inverse_sigma=np.ascontiguousarray(self.inverse_sigma[window]))
+        part.__dict__["surely_background"] = tuple(bound[window] for bound in self.surely_background)  # not computed anew
+        return part
+
+    @cached_property
+    def _background_of_cells(self) -> tuple[Image, Image]:
+        """Least and greatest means of Y, Cr, Cb of background in a picture's cells (H / CELL, W / CELL, 3)."""
+        import cv2
+
+        lowest, highest = self.surely_background
+        low, high = np.asarray(cv2.erode(lowest, disc(CELL // 2))), np.asarray(cv2.dilate(highest, disc(CELL // 2)))  # edges are smoothed
+        low, high = (means_of_cells(each.astype(np.float32)) for each in (low, high))
+        return np.floor(low).astype(np.uint8), np.ceil(high).astype(np.uint8)
+
     @cached_property
     def surely_background(self) -> tuple[Image, Image]:
         """Least and greatest Y, Cr, Cb (H, W, 3) that are certainly background: a quick test that decides most pixels."""
@@ -103,6 +145,22 @@ class ChannelClassifier:
         reach = np.where(keyed > 0, ROUNDING_MARGIN * self.factor / (self.inverse_sigma * np.sqrt(keyed.sum())), np.float32(256))
         lowest, highest = np.ceil(self.mean - reach), np.floor(self.mean + reach)
         return np.clip(lowest, 0, 255).astype(np.uint8), np.clip(highest, 0, 255).astype(np.uint8)
+
+
+def _around(first: NDArray[np.int32], extent: NDArray[np.int32]) -> slice:
+    """Pixels, along one axis, of cells from `first` (K,) on, each of an `extent` (K,), with a margin."""
+    low, high = CELL * int(first.min()), CELL * int((first + extent).max())
+    margin = CELL + math.ceil(AROUND * (high - low))
+    return slice(max(low - margin, 0), high + margin)
+
+
+def means_of_cells(image: np.ndarray) -> np.ndarray:
+    """Means (H / CELL, W / CELL, ...) of the middle pixels of a picture's square cells; a last row or column of less than a cell is left
+    out."""
+    import cv2
+
+    height, width = image.shape[0] // CELL, image.shape[1] // CELL
+    return np.asarray(cv2.resize(image[: height * CELL, : width * CELL], (width, height), interpolation=cv2.INTER_LINEAR))
 
 
 def edge_jitter(mean: np.ndarray) -> np.ndarray:

@@ -36,11 +36,14 @@ def coarse_person(label: Labels, several: bool = False) -> Labels:
     """The connected part, without specks, with the most pixels labelled 2; with `several` all but small ones."""
     import cv2
 
-    likely = cv2.medianBlur((label > 0).astype(np.uint8), 3)
+    around, out = bounding_window(label, 3), np.zeros(label.shape, np.uint8)
+    if not (inner := label[around]).any():
+        return out
+    likely = cv2.medianBlur((inner > 0).astype(np.uint8), 3)
     likely = np.asarray(cv2.morphologyEx(likely, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)), np.uint8)
-    out, window = np.zeros_like(likely), bounding_window(likely, 0)
+    window = bounding_window(likely, 0)
     if likely[window].size:
-        out[window] = main_part(likely[window], (label[window] == 2) & (likely[window] > 0), several)
+        out[around][window] = main_part(likely[window], (inner[window] == 2) & (likely[window] > 0), several)
     return out
 
 

@@ -16,6 +16,7 @@ from shadowpuppet.camera.projection import make_lens, pixel_nearest
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
+from shadowpuppet.threads import shared_out
 from shadowpuppet.tracking.keypoints.sights import NO_SIGHTS, Sights
 from shadowpuppet.tracking.multiview.keypoint_evidence import KeypointEvidence
 from shadowpuppet.tracking.multiview.refinement.correspondence import Cloud, make_cloud
@@ -124,8 +125,14 @@ class MultiviewObservation:
 
     def mismatch(self, poses: Array) -> Array:
         """Pixels in which drawn poses (N, D) and silhouettes differ (Liu 2011, eq. 2), as shares (N,) of the silhouettes' area."""
-        differing = [silhouette_costs(picture, observation, poses) for picture, observation in self.silhouettes]
-        return sum(differing, np.zeros(len(poses))) / max(self.area, 1)
+        differing = np.empty((len(self.silhouettes), len(poses)))
+
+        def work(n: int) -> None:
+            picture, observation = self.silhouettes[n]
+            differing[n] = silhouette_costs(picture, observation, poses)
+
+        shared_out(work, range(len(differing)))
+        return differing.sum(0) / max(self.area, 1)
 
     def outside(self, pose: Array) -> float:
         """Share of the spheres along the limbs of a pose (D,) that reach out of two silhouettes or more; of one alone a limb may be hidden

@@ -23,6 +23,8 @@ LANES = 16
 """Points per group, the number that one AVX-512 instruction processes."""
 FAR = np.float32(1e6)
 TINY = np.float32(1e-12)
+FLAT = np.float32(1e-4)
+"""Height (m) of a dome up to which an end is flat."""
 PART_NUMBERS = 25
 """Constants per part: axes (9), origin (3), centre and radius of the bounding sphere (4), length, shear (2), radii (4), caps (2)."""
 
@@ -109,12 +111,19 @@ def place_parts(T, origin, joints, rotations, starts, parts):  # pragma: no cove
 def closest_on_part(q, rows, out):  # pragma: no cover
     """Fill out (8 LANES,) for a group of points (7 LANES,) and one part q (PART_NUMBERS,): signed distance, cosine between the normals,
     closest point (3) and its outward normal (3), the last two in the part's frame."""
-    for i in range(LANES):
-        x, y, z, nx, ny, nz = _load(rows, i)
-        d, cosine, fx, fy, fz, ux, uy, uz = _closest(q, x, y, z, nx, ny, nz)
-        out[i], out[LANES + i] = d, cosine
-        out[2 * LANES + i], out[3 * LANES + i], out[4 * LANES + i] = fx, fy, fz
-        out[5 * LANES + i], out[6 * LANES + i], out[7 * LANES + i] = ux, uy, uz
+    if min(q[23], q[24]) > FLAT:
+        for i in range(LANES):
+            _enter(out, i, _closest_if_round(q, rows, i))
+    else:
+        for i in range(LANES):
+            _enter(out, i, _closest(q, rows, i))
+
+
+@device
+def _enter(out, i, found):  # pragma: no cover
+    """Enter what `_closest` found of point i."""
+    for k in range(8):
+        out[k * LANES + i] = found[k]
 
 
 @reduction_kernel
@@ -122,14 +131,24 @@ def _compete(q, number, rows, epsilon, choice, near):  # pragma: no cover
     """Enter part q into `near` (3 LANES,), laid out as in `nearest`, for those points of a group that are closer to it."""
     one = np.float32(1)
     for i in range(LANES):
-        x, y, z, nx, ny, nz = _load(rows, i)
-        d, cosine, _, _, _, _, _, _ = _closest(q, x, y, z, nx, ny, nz)
+        d, cosine, _, _, _, _, _, _ = _closest(q, rows, i)
         d = abs(d)
         apart = d * (one - choice * cosine)
         closer = apart < near[2 * LANES + i]
         near[i] = d * (one - epsilon * cosine) if closer else near[i]  # eq. 31
         near[LANES + i] = number if closer else near[LANES + i]
         near[2 * LANES + i] = apart if closer else near[2 * LANES + i]
+
+
+@reduction_kernel
+def _compete_round(q, number, rows, near):  # pragma: no cover
+    """As `_compete` for a part with domed ends, and without normals."""
+    for i in range(LANES):
+        d = abs(_closest_if_round(q, rows, i)[0])
+        closer = d < near[2 * LANES + i]
+        near[i] = d if closer else near[i]
+        near[LANES + i] = number if closer else near[LANES + i]
+        near[2 * LANES + i] = d if closer else near[2 * LANES + i]
 
 
 @reduction_kernel
@@ -140,7 +159,7 @@ def nearest(parts, rows, sphere, epsilon, choice, near):  # pragma: no cover
     The part whose number is at near[LANES] is tried first.
     """
     x, y, z, radius = sphere[0], sphere[1], sphere[2], sphere[3]
-    first, worst = np.int64(near[LANES]), FAR
+    first, worst, plain = np.int64(near[LANES]), FAR, epsilon == 0 and choice == 0
     for i in range(LANES):
         near[i] = near[2 * LANES + i] = FAR
     for turn in range(parts.shape[0]):
@@ -149,7 +168,10 @@ def nearest(parts, rows, sphere, epsilon, choice, near):  # pragma: no cover
         dx, dy, dz = q[12] - x, q[13] - y, q[14] - z
         gap = np.sqrt(dx * dx + dy * dy + dz * dz) - radius - q[15]
         if gap * (np.float32(1) - choice) <= worst:
-            _compete(q, np.float32(s), rows, epsilon, choice, near)
+            if plain and min(q[23], q[24]) > FLAT:
+                _compete_round(q, np.float32(s), rows, near)
+            else:
+                _compete(q, np.float32(s), rows, epsilon, choice, near)
             worst = _greatest(near[2 * LANES :])
 
 
@@ -170,20 +192,21 @@ def closest_point(q, out, i):  # pragma: no cover
 
 
 @device
-def _load(rows, i):  # pragma: no cover
-    """Position and normal of point i of a group."""
-    return rows[i], rows[LANES + i], rows[2 * LANES + i], rows[3 * LANES + i], rows[4 * LANES + i], rows[5 * LANES + i]
+def _load(q, rows, i):  # pragma: no cover
+    """Position and normal of point i of a group in the frame of part q."""
+    x, y, z = rows[i] - q[9], rows[LANES + i] - q[10], rows[2 * LANES + i] - q[11]
+    nx, ny, nz = rows[3 * LANES + i], rows[4 * LANES + i], rows[5 * LANES + i]
+    return (q[0] * x + q[1] * y + q[2] * z, q[3] * x + q[4] * y + q[5] * z, q[6] * x + q[7] * y + q[8] * z,
+            q[0] * nx + q[1] * ny + q[2] * nz, q[3] * nx + q[4] * ny + q[5] * nz, q[6] * nx + q[7] * ny + q[8] * nz)
 
 
 @device
-def _closest(q, x, y, z, nx, ny, nz):  # pragma: no cover
-    """Signed distance of a point to part q, cosine of the normals, closest point (3) and outward normal (3) in the part's frame."""
-    one, nil, half = np.float32(1), np.float32(0), np.float32(1e-4)
+def _round(q, px, py, pz):  # pragma: no cover
+    """Signed distance of a point in the frame of part q, as if both ends were domed, and the gradient (3) there; the point from the axis
+    (2) and from the nearest place between the ends, and the square of its level."""
+    one, nil = np.float32(1), np.float32(0)
     L, a0, b0, a1, b1, h0, h1 = q[16], q[19], q[20], q[21], q[22], q[23], q[24]
     slope_x, slope_y, slope_a, slope_b = q[17] / L, q[18] / L, (a1 - a0) / L, (b1 - b0) / L
-    x, y, z = x - q[9], y - q[10], z - q[11]
-    px, py, pz = q[0] * x + q[1] * y + q[2] * z, q[3] * x + q[4] * y + q[5] * z, q[6] * x + q[7] * y + q[8] * z
-    mx, my, mz = q[0] * nx + q[1] * ny + q[2] * nz, q[3] * nx + q[4] * ny + q[5] * nz, q[6] * nx + q[7] * ny + q[8] * nz
     inner = min(max(pz, nil), L)
     over = pz - inner
     u, v, a, b = px - slope_x * inner, py - slope_y * inner, a0 + slope_a * inner, b0 + slope_b * inner
@@ -191,27 +214,43 @@ def _closest(q, x, y, z, nx, ny, nz):  # pragma: no cover
     su, sv = u * ia, v * ib
     square = su * su + sv * sv
     height = h0 if over < nil else h1
-    domed = height > half
-    ih = one / height if domed else nil
-    side = over == nil
+    ih = one / height if height > FLAT else nil
     w = over * ih
     rho2 = square + w * w + TINY
     # the gradient of rho, times rho
     gx, gy = su * ia, sv * ib
     along = -(su * su * slope_a * ia + sv * sv * slope_b * ib + gx * slope_x + gy * slope_y)
-    gz = along if side else w * ih
-    irho, steep = one / np.sqrt(rho2), one / np.sqrt(gx * gx + gy * gy + gz * gz + TINY)
-    d = (rho2 - np.sqrt(rho2)) * steep
-    ux, uy, uz = gx * steep, gy * steep, gz * steep
+    gz = along if over == nil else w * ih
+    steep = one / np.sqrt(gx * gx + gy * gy + gz * gz + TINY)
+    return (rho2 - np.sqrt(rho2)) * steep, gx * steep, gy * steep, gz * steep, u, v, over, rho2
+
+
+@device
+def _closest_if_round(q, rows, i):  # pragma: no cover
+    """What `_closest` finds, if both ends are domed."""
+    px, py, pz, mx, my, mz = _load(q, rows, i)
+    d, ux, uy, uz, _, _, _, _ = _round(q, px, py, pz)
+    return d, ux * mx + uy * my + uz * mz, px - d * ux, py - d * uy, pz - d * uz, ux, uy, uz
+
+
+@device
+def _closest(q, rows, i):  # pragma: no cover
+    """Signed distance of point i of a group to part q, cosine of the normals, closest point (3) and outward normal (3) in the part's
+    frame."""
+    one, nil = np.float32(1), np.float32(0)
+    L, h0, h1 = q[16], q[23], q[24]
+    px, py, pz, mx, my, mz = _load(q, rows, i)
+    d, ux, uy, uz, u, v, over, rho2 = _round(q, px, py, pz)
     fx, fy, fz = px - d * ux, py - d * uy, pz - d * uz
     # beyond a flat end: the nearest point of a disc; inside, near a flat end: the end
+    side = over == nil
     inside = side & (rho2 < one)
-    low = inside & (h0 <= half) & (pz < -d) & ((h1 > half) | (pz <= L - pz))
-    high = inside & (h1 <= half) & (L - pz < -d) & ((h0 > half) | (L - pz < pz))
-    flat = ((not side) & (not domed)) | low | high
+    low = inside & (h0 <= FLAT) & (pz < -d) & ((h1 > FLAT) | (pz <= L - pz))
+    high = inside & (h1 <= FLAT) & (L - pz < -d) & ((h0 > FLAT) | (L - pz < pz))
+    flat = ((not side) & ((h0 if over < nil else h1) <= FLAT)) | low | high
     up = (over > nil) | high
     level = L if up else nil
-    shrink = irho if rho2 > one else one
+    shrink = one / np.sqrt(rho2) if rho2 > one else one
     ex, ey = px - u + u * shrink, py - v + v * shrink
     dx, dy, dz = px - ex, py - ey, pz - level
     reach = np.sqrt(dx * dx + dy * dy + dz * dz) + TINY

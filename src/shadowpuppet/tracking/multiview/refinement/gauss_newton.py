@@ -141,7 +141,7 @@ def descend(poses, centre, pull, chain, limbs, rows, groups, origin, points, num
     D = pull.size
     g, best, step = vectors[0, :D], vectors[1, :D], vectors[2, :D]
     for n in range(poses.shape[0]):
-        pose, about = poses[n], centre[min(n, centre.shape[0] - 1)]
+        pose, about = poses[n], centre[n]
         least, damp = np.inf, damping
         for turn in range(iterations + 1):
             place_one(pose, chain, T, screws, work)

@@ -42,11 +42,10 @@ def bounded_cost(rows, near, tau):  # pragma: no cover
 @device
 def is_first_of_part(near, i):  # pragma: no cover
     """Whether no earlier point of the group is nearest to the same part as point `i`."""
-    fresh = True
-    for k in range(i):
-        if near[LANES + k] == near[LANES + i]:
-            fresh = False
-    return fresh
+    k = i - 1
+    while k >= 0 and near[LANES + k] != near[LANES + i]:
+        k -= 1
+    return k < 0
 
 
 @device

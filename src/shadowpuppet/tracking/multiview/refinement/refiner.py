@@ -17,6 +17,7 @@ from shadowpuppet.body.shapes import Body
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
 from shadowpuppet.jit import kernel
+from shadowpuppet.threads import in_parts, shared_out
 from shadowpuppet.tracking.keypoints.definitions import NO_LANDMARKS, Landmarks, landmarks_of
 from shadowpuppet.tracking.keypoints.likelihood import surprises
 from shadowpuppet.tracking.keypoints.sights import NO_SIGHTS, Sights
@@ -76,8 +77,12 @@ class Refiner:
     def costs(self, poses: Array, cloud: Cloud, tau: float | None = None) -> Array:
         """D of eq. 30 for poses (N, D): the mean over the points of min(d^2, tau^2), m^2, of shape (N,). `tau` replaces the settings'."""
         poses, out = self.body.skeleton.checked(poses), np.empty(len(poses))
-        _costs(poses, self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin, self._numbers(tau), self._which(cloud),
-               self._room(), out)
+
+        def work(part: slice) -> None:
+            _costs(poses[part], self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin, self._numbers(tau), self._which(cloud),
+                   self._room(), out[part])
+
+        shared_out(work, in_parts(len(poses)))
         return out / max(cloud.total, 1e-9)
 
     def gauss_newton(self, poses: Array, passes: Sequence[Pass | tuple[Cloud, int, float]], centre: Array, pull: Array,
@@ -98,15 +103,19 @@ class Refiner:
     def descend(self, poses: Array, each: Pass, centre: Array, pull: Array, damping: float = 0.03) -> tuple[Array, Array]:
         """Poses (N, D) refined by one pass of `gauss_newton`, whose arguments these are, and what they cost then (N,), m^2."""
         poses = self.body.skeleton.checked(poses).copy()
-        centre, pull = np.ascontiguousarray(np.atleast_2d(centre), float), np.asarray(pull, float)
+        centre, pull = np.broadcast_to(np.asarray(centre, float), poses.shape), np.asarray(pull, float)
         cloud, iterations, tau, space, emptiness, sights, worth = each
         space, costs = space or self._no_space, np.empty(len(poses))
         marks = self.landmarks if sights.size else NO_LANDMARKS
-        keypoints = marks.arrays, sights, worth, np.zeros((len(marks.names), 3)), np.zeros((sights.size, 2, 2))
-        distances = np.empty((len(space.windows), len(self.spheres.radii), 4))
-        descend(poses, centre, pull, self._chain, self._limbs, cloud.rows, cloud.spheres, cloud.origin, max(cloud.total, 1e-9),
-                self._numbers(tau), damping, iterations, self._which(cloud), self._room(), self._system(), self.spheres, space,
-                distances, emptiness, keypoints, costs)
+
+        def work(part: slice) -> None:
+            keypoints = marks.arrays, sights, worth, np.zeros((len(marks.names), 3)), np.zeros((sights.size, 2, 2))
+            distances = np.empty((len(space.windows), len(self.spheres.radii), 4))
+            descend(poses[part], np.ascontiguousarray(centre[part]), pull, self._chain, self._limbs, cloud.rows, cloud.spheres,
+                    cloud.origin, max(cloud.total, 1e-9), self._numbers(tau), damping, iterations, self._which(cloud), self._room(),
+                    self._system(), self.spheres, space, distances, emptiness, keypoints, costs[part])
+
+        shared_out(work, in_parts(len(poses)))
         return poses, costs
 
     def surprises(self, poses: Array, sights: Sights) -> Array:
@@ -119,10 +128,14 @@ class Refiner:
         with the fine bound of the forces."""
         poses, s = self.body.skeleton.checked(poses).copy(), settings
         half = s.iterations // 2
-        for tau, iterations in ((s.coarse_tau, half), (s.fine_tau, s.iterations - half)):
-            push(poses, RHO[s.rho], s.modulated, s.hierarchical, (s.translation, s.rotation), s.balance, iterations, self._chain,
-                 self._limbs, cloud.rows, cloud.spheres, cloud.origin, self._numbers(tau), self._which(cloud), self._room(),
-                 self._system()[2])
+
+        def work(part: slice) -> None:
+            for tau, iterations in ((s.coarse_tau, half), (s.fine_tau, s.iterations - half)):
+                push(poses[part], RHO[s.rho], s.modulated, s.hierarchical, (s.translation, s.rotation), s.balance, iterations, self._chain,
+                     self._limbs, cloud.rows, cloud.spheres, cloud.origin, self._numbers(tau), self._which(cloud), self._room(),
+                     self._system()[2])
+
+        shared_out(work, in_parts(len(poses)))
         return poses
 
     def _numbers(self, tau: float | None = None) -> tuple[np.float32, ...]:
