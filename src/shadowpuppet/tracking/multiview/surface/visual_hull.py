@@ -7,6 +7,7 @@ silhouettes (Matusik et al. 2000, "Image-based visual hulls").
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, check_mask, may_be_person
 from shadowpuppet.camera.projection import make_lens
 from shadowpuppet.errors import CalibrationError, TrackingError
-from shadowpuppet.geometry import Array, inverse, transform
+from shadowpuppet.geometry import Array, inverse
 from shadowpuppet.tracking.multiview.settings import HullSettings
 from shadowpuppet.tracking.multiview.surface.contours import trace_contours
 from shadowpuppet.tracking.multiview.surface.viewing_edges import bounding_circles, contour_length, cut_rays, spaced_vertices, straighten
@@ -48,6 +49,10 @@ class SurfacePoints(NamedTuple):
 
 NO_SURFACE = SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))
 """Where nothing is seen."""
+
+
+LENSES = 64
+"""Number of lenses whose arrays are kept."""
 
 
 class _View(NamedTuple):
@@ -167,12 +172,18 @@ class VisualHull:
 
 
 def _view(camera: Camera) -> _View:
-    """The arrays of a camera."""
+    """The arrays of a camera, which are computed once for each lens."""
+    return _view_through(camera.size, tuple(camera.matrix.ravel().tolist()), tuple(camera.distortion.tolist()), camera.fisheye)
+
+
+@lru_cache(LENSES)
+def _view_through(size: tuple[int, int], matrix: tuple[float, ...], distortion: tuple[float, ...], fisheye: bool) -> _View:
+    camera = Camera("lens", size, np.reshape(matrix, (3, 3)), np.array(distortion), fisheye=fisheye)
     (width, height), lens = camera.size, make_lens(camera)
     x, y = (np.linspace(-0.5, side - 0.5, -(-side // GRID_PITCH) + 1) for side in (width, height))
     pixels = np.stack(np.meshgrid(x, y), -1)
     rays = camera.rays(pixels)
-    back = camera.project(transform(inverse(camera.T_camera_world), rays))
+    back = camera.project(rays)
     good = (np.abs(back - pixels).max(-1) < MAX_RETURN_ERROR) & (np.linalg.norm(rays[..., :2], axis=-1) < min(camera.reach, MAX_RADIUS))
     numbers = [*np.diag(camera.matrix)[:2], *camera.matrix[:2, 2], width, height, camera.fisheye, min(lens[-1], MAX_RADIUS)]
     flat = np.where(good[..., None], rays[..., :2], 0.0)
