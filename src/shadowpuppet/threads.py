@@ -90,13 +90,13 @@ def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, "shared")
 
 
-PARTS, LEAST = 4, 4
-"""Most parts of `in_parts`, and least number of items in one."""
+PARTS = 4
+"""Most parts of `in_parts`, and least number of items in one of several."""
 
 
 def in_parts(number: int) -> list[slice]:
     """A number of items in parts for `shared_out`; the same on every machine, so that results that depend on them are, too."""
-    parts = max(1, min(PARTS, number // LEAST))
+    parts = max(1, min(PARTS, number // PARTS))
     return [slice(number * n // parts, number * (n + 1) // parts) for n in range(parts)]
 
 

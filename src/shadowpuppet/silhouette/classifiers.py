@@ -27,6 +27,7 @@ from shadowpuppet.silhouette.background import (
     to_planes,
 )
 from shadowpuppet.silhouette.boundary import Labels, disc
+from shadowpuppet.silhouette.cleanup import MIN_PART_SHARE
 
 if TYPE_CHECKING:
     from shadowpuppet.silhouette.settings import SilhouetteSettings
@@ -41,9 +42,8 @@ CERTAIN_FACTOR = 2.0
 ROUNDING_MARGIN = 1 - 1e-4
 """Factor on a threshold that keeps it on the safe side of single precision."""
 
-CELL, SPECK, AROUND = 4, 2, 0.25
-"""Side (pixels) of the cells whose means show where a frame differs; most cells of a speck, which may lie anywhere; and the margin about the
-others, as a share of their box."""
+CELL, AROUND = 4, 0.25
+"""Side (pixels) of the cells whose means show where a frame differs, and the margin about these, as a share of their box."""
 EDGE_JITTER = 0.05
 """Standard deviation added at the background's edges, over the change of its value across a pixel: cameras shake."""
 
@@ -108,16 +108,17 @@ class ChannelClassifier:
         return label
 
     def different(self, image: Image) -> Window:
-        """Rows and columns of a picture (H, W, 3) or (H, W) beyond which it is background but for specks of one or two cells: the mean of
-        no other cell of pixels there differs from it."""
+        """Rows and columns of a picture (H, W, 3) or (H, W) beyond which it is background: the means of cells of pixels do not differ from
+        it there but for parts too small to be kept (`cleanup.MIN_PART_SHARE`)."""
         import cv2
 
         if min(image.shape[:2]) < CELL:
             return slice(None), slice(None)
         differ = ~np.asarray(cv2.inRange(to_planes(means_of_cells(image)), *self._background_of_cells), np.uint8)
         left, top, width, height, area = cv2.connectedComponentsWithStats(differ)[2][1:].T
-        if not (large := area > SPECK).any():
+        if not len(area):
             return slice(0), slice(0)
+        large = area >= MIN_PART_SHARE * area.max()
         return _around(top[large], height[large]), _around(left[large], width[large])
 
     def within(self, window: Window) -> ChannelClassifier:

@@ -141,14 +141,25 @@ def _compete(q, number, rows, epsilon, choice, near):  # pragma: no cover
 
 
 @reduction_kernel
-def _compete_round(q, number, rows, near):  # pragma: no cover
-    """As `_compete` for a part with domed ends, and without normals."""
+def _compete_by_distance(q, number, rows, near):  # pragma: no cover
+    """As `_compete` without normals."""
     for i in range(LANES):
-        d = abs(_closest_if_round(q, rows, i)[0])
-        closer = d < near[2 * LANES + i]
-        near[i] = d if closer else near[i]
-        near[LANES + i] = number if closer else near[LANES + i]
-        near[2 * LANES + i] = d if closer else near[2 * LANES + i]
+        _enter_if_closer(near, i, number, abs(_closest(q, rows, i)[0]))
+
+
+@reduction_kernel
+def _compete_if_round(q, number, rows, near):  # pragma: no cover
+    """As `_compete_by_distance` for a part with domed ends."""
+    for i in range(LANES):
+        _enter_if_closer(near, i, number, abs(_closest_if_round(q, rows, i)[0]))
+
+
+@device
+def _enter_if_closer(near, i, number, d):  # pragma: no cover
+    closer = d < near[2 * LANES + i]
+    near[i] = d if closer else near[i]
+    near[LANES + i] = number if closer else near[LANES + i]
+    near[2 * LANES + i] = d if closer else near[2 * LANES + i]
 
 
 @reduction_kernel
@@ -159,20 +170,31 @@ def nearest(parts, rows, sphere, epsilon, choice, near):  # pragma: no cover
     The part whose number is at near[LANES] is tried first.
     """
     x, y, z, radius = sphere[0], sphere[1], sphere[2], sphere[3]
-    first, worst, plain = np.int64(near[LANES]), FAR, epsilon == 0 and choice == 0
+    first, worst = np.int64(near[LANES]), FAR
     for i in range(LANES):
         near[i] = near[2 * LANES + i] = FAR
     for turn in range(parts.shape[0]):
         s = first if turn == 0 else (turn - 1 if turn <= first else turn)
-        q = parts[s]
+        q, number = parts[s], np.float32(s)
         dx, dy, dz = q[12] - x, q[13] - y, q[14] - z
         gap = np.sqrt(dx * dx + dy * dy + dz * dz) - radius - q[15]
         if gap * (np.float32(1) - choice) <= worst:
-            if plain and min(q[23], q[24]) > FLAT:
-                _compete_round(q, np.float32(s), rows, near)
+            if choice != 0 or epsilon != 0:
+                _compete(q, number, rows, epsilon, choice, near)
+            elif min(q[23], q[24]) > FLAT:
+                _compete_if_round(q, number, rows, near)
             else:
-                _compete(q, np.float32(s), rows, epsilon, choice, near)
+                _compete_by_distance(q, number, rows, near)
             worst = _greatest(near[2 * LANES :])
+
+
+@device
+def is_first_of_part(near, i):  # pragma: no cover
+    """Whether no earlier point of the group is nearest to the same part as point `i`."""
+    k = i - 1
+    while k >= 0 and near[LANES + k] != near[LANES + i]:
+        k -= 1
+    return k < 0
 
 
 @reduction_kernel

@@ -6,8 +6,15 @@ import numpy as np
 
 from shadowpuppet.body.jacobian import MAX_STEP, TRANSLATION, place_one
 from shadowpuppet.jit import device, kernel, reduction_kernel
-from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, closest_on_part, closest_point, nearest, place_parts
-from shadowpuppet.tracking.multiview.refinement.part_sums import add_descendants, is_first_of_part, sum_by_joint
+from shadowpuppet.tracking.multiview.refinement.correspondence import (
+    LANES,
+    closest_on_part,
+    closest_point,
+    is_first_of_part,
+    nearest,
+    place_parts,
+)
+from shadowpuppet.tracking.multiview.refinement.part_sums import add_descendants, sum_by_joint
 
 UNBOUNDED, LINEAR, QUADRATIC = range(3)
 """rho of eq. 32; the quadratic one is divided by tau, so that all have the same bound."""
@@ -41,12 +48,12 @@ def _sum_forces(rho, modulated, T, limbs, rows, spheres, origin, numbers, which,
     """Fill the joints' sums of forces and moments, under transforms T (J, 3, 4)."""
     parts, _, _, _, out, lanes, sums = room
     joints, rotations, starts = limbs
-    epsilon, choice, tau = numbers
+    _, choice, tau = numbers
     place_parts(T, origin, joints, rotations, starts, parts)
     lanes[:] = 0
     for group in range(spheres.shape[0]):
         near, points = which[group], rows[group]
-        nearest(parts, points, spheres[group], epsilon, choice, near)
+        nearest(parts, points, spheres[group], np.float32(0), choice, near)  # the distances themselves are not used
         for i in range(LANES):
             if is_first_of_part(near, i):
                 number = near[LANES + i]

@@ -6,10 +6,17 @@ import numpy as np
 
 from shadowpuppet.body.jacobian import MAX_STEP, TRANSLATION, place_one
 from shadowpuppet.jit import kernel, reduction_kernel
-from shadowpuppet.tracking.multiview.refinement.correspondence import LANES, closest_on_part, closest_point, nearest, place_parts
+from shadowpuppet.tracking.multiview.refinement.correspondence import (
+    LANES,
+    closest_on_part,
+    closest_point,
+    is_first_of_part,
+    nearest,
+    place_parts,
+)
 from shadowpuppet.tracking.multiview.refinement.free_space import push_inside
 from shadowpuppet.tracking.multiview.refinement.keypoint_rays import pull_to_rays
-from shadowpuppet.tracking.multiview.refinement.part_sums import add_descendants, bounded_cost, is_first_of_part, sum_by_joint, sum_costs
+from shadowpuppet.tracking.multiview.refinement.part_sums import add_descendants, bounded_cost, sum_by_joint, sum_costs
 
 
 @kernel

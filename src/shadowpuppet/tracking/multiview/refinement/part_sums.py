@@ -40,15 +40,6 @@ def bounded_cost(rows, near, tau):  # pragma: no cover
 
 
 @device
-def is_first_of_part(near, i):  # pragma: no cover
-    """Whether no earlier point of the group is nearest to the same part as point `i`."""
-    k = i - 1
-    while k >= 0 and near[LANES + k] != near[LANES + i]:
-        k -= 1
-    return k < 0
-
-
-@device
 def sum_by_joint(joints, lanes, sums):  # pragma: no cover
     """Fill sums (J, SUMS) with the totals of the parts' lanes (S, SUMS LANES)."""
     sums[:] = 0

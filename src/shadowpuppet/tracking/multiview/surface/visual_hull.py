@@ -7,7 +7,7 @@ silhouettes (Matusik et al. 2000, "Image-based visual hulls").
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import lru_cache
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -49,10 +49,6 @@ class SurfacePoints(NamedTuple):
 
 NO_SURFACE = SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))
 """Where nothing is seen."""
-
-
-LENSES = 64
-"""Number of lenses whose arrays are kept."""
 
 
 class _View(NamedTuple):
@@ -176,7 +172,7 @@ def _view(camera: Camera) -> _View:
     return _view_through(camera.size, tuple(camera.matrix.ravel().tolist()), tuple(camera.distortion.tolist()), camera.fisheye)
 
 
-@lru_cache(LENSES)
+@cache
 def _view_through(size: tuple[int, int], matrix: tuple[float, ...], distortion: tuple[float, ...], fisheye: bool) -> _View:
     camera = Camera("lens", size, np.reshape(matrix, (3, 3)), np.array(distortion), fisheye=fisheye)
     (width, height), lens = camera.size, make_lens(camera)
