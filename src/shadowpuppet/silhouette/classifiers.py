@@ -27,7 +27,7 @@ from shadowpuppet.silhouette.background import (
     to_planes,
 )
 from shadowpuppet.silhouette.boundary import Labels, disc
-from shadowpuppet.silhouette.cleanup import MIN_PART_SHARE
+from shadowpuppet.silhouette.cleanup import MAX_PART_GAP, MIN_PART_SHARE
 
 if TYPE_CHECKING:
     from shadowpuppet.silhouette.settings import SilhouetteSettings
@@ -42,8 +42,8 @@ CERTAIN_FACTOR = 2.0
 ROUNDING_MARGIN = 1 - 1e-4
 """Factor on a threshold that keeps it on the safe side of single precision."""
 
-CELL, AROUND = 4, 0.25
-"""Side (pixels) of the cells whose means show where a frame differs, and the margin about these, as a share of their box."""
+CELL = 4
+"""Side (pixels) of the cells whose means show where a frame differs."""
 EDGE_JITTER = 0.05
 """Standard deviation added at the background's edges, over the change of its value across a pixel: cameras shake."""
 
@@ -109,7 +109,7 @@ class ChannelClassifier:
 
     def different(self, image: Image) -> Window:
         """Rows and columns of a picture (H, W, 3) or (H, W) beyond which it is background: the means of cells of pixels do not differ from
-        it there but for parts too small to be kept (`cleanup.MIN_PART_SHARE`)."""
+        it there but for parts too small and too far away to be kept (`cleanup.main_part`)."""
         import cv2
 
         if min(image.shape[:2]) < CELL:
@@ -118,8 +118,8 @@ class ChannelClassifier:
         left, top, width, height, area = cv2.connectedComponentsWithStats(differ)[2][1:].T
         if not len(area):
             return slice(0), slice(0)
-        large = area >= MIN_PART_SHARE * area.max()
-        return _around(top[large], height[large]), _around(left[large], width[large])
+        large, gap = area >= MIN_PART_SHARE * area.max(), CELL + math.ceil(CELL * MAX_PART_GAP * area.sum() ** 0.5)
+        return _around(top[large], height[large], gap), _around(left[large], width[large], gap)
 
     def within(self, window: Window) -> ChannelClassifier:
         """The classifier of a window of rows and columns of pictures."""
@@ -148,11 +148,9 @@ class ChannelClassifier:
         return np.clip(lowest, 0, 255).astype(np.uint8), np.clip(highest, 0, 255).astype(np.uint8)
 
 
-def _around(first: NDArray[np.int32], extent: NDArray[np.int32]) -> slice:
+def _around(first: NDArray[np.int32], extent: NDArray[np.int32], margin: int) -> slice:
     """Pixels, along one axis, of cells from `first` (K,) on, each of an `extent` (K,), with a margin."""
-    low, high = CELL * int(first.min()), CELL * int((first + extent).max())
-    margin = CELL + math.ceil(AROUND * (high - low))
-    return slice(max(low - margin, 0), high + margin)
+    return slice(max(CELL * int(first.min()) - margin, 0), CELL * int((first + extent).max()) + margin)
 
 
 def means_of_cells(image: np.ndarray) -> np.ndarray:
