@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shadowpuppet.jit import compiled
-
-NEVER = 5e8
-"""Cost from which on a label counts as impossible."""
+from shadowpuppet.silhouette.recovery.labelling import NEVER
 
 
 @compiled(nogil=True)
@@ -91,7 +89,7 @@ def send(direction, between, cost, undecided, messages, work):
     across, along = (height, width) if direction < 2 else (width, height)
     against, forward = direction ^ 1, 1 - 2 * (direction % 2)
     total, sent = work[0], work[1]
-    labels, never = len(total), np.float32(NEVER)
+    labels, never = len(total), np.float32(NEVER / 2)
     for a in range(across):
         for b in range(along - 1):
             at = b if forward == 1 else along - 1 - b

@@ -21,7 +21,7 @@ COSTS = np.array([STEP, OUTLINE, UNSEEN_OUTLINE, 0.5 / TOLERANCE**2], np.float32
 SWEEPS = 10
 """Rounds of messages to the right, left, down and up."""
 NEVER = 1e9
-"""Cost of a label that a pixel cannot have."""
+"""Cost of a label that a pixel cannot have; from half of it on, a sum of costs is taken for that."""
 
 
 def pair_costs(colour: Floats, share: Floats, undecided: NDArray[np.bool_]) -> Floats:

@@ -23,12 +23,10 @@ RARE_COST, MOVED_COST, STEADY_COST, ENCLOSED_GAIN, BELOW_COST = 0.3, 0.4, 1.5, 0
 """Costs of labels: of a scene that is seen rarely, over the logarithm of its share of the frames; of a covered pixel that something moved
 over, and of one whose colour stays the same nevertheless, over the share of frames that have it. Gain of a covered pixel that is
 enclosed, and cost of one below the trunk."""
-COLOUR_WEIGHT, GREATEST_RATIO = 1.5, 3.0
-"""Weight of a colour's log likelihood ratio, and its limit."""
+COLOUR_WEIGHT = 1.5
+"""Weight of a colour's log likelihood ratio."""
 CALM_WEIGHT = 0.02
 """Weight in the person's colours of an enclosed pixel that is covered, against one that is passed over in all frames."""
-CALM_SHARE = 0.25
-"""Least area of a part of such pixels over that of the largest."""
 VARIANT = 1.75
 """Distance of a mode from the scene's at the pixel, over a mode's radius, up to which it is the scene in another light, not the person."""
 PART_SHARE, PART_COLOUR = 0.02, 0.5
@@ -165,30 +163,17 @@ def _colour_ratio(field: _Field, labels: NDArray[np.intp] | None, below: NDArray
     still = field.still[~field.movement.region]
     if labels is None:
         share = known(modes.colour, colour_model(still, np.ones(len(still))))
-        return np.where(share > UNKNOWN, -0.5 * np.log(np.maximum(share, UNKNOWN) / UNKNOWN), 0.5).clip(-GREATEST_RATIO, GREATEST_RATIO)
+        return np.where(share > UNKNOWN, -0.5 * np.log(np.maximum(share, UNKNOWN) / UNKNOWN), 0.5)
     uncovered = np.flatnonzero(labels < COUNT)
     sure = np.flatnonzero((labels < COUNT) & ~below)
     scene = np.concatenate([still, modes.colour[sure, labels[sure]]])
     passing = modes.share[uncovered]
     own = modes.colour[uncovered, labels[uncovered]]
     passing[(np.abs(modes.colour[uncovered] - own[:, None]) <= VARIANT * field.radius).all(2)] = 0
-    calm = _calm(field, labels)
+    calm = (labels == COUNT) & field.movement.enclosed[field.movement.region]
     weights = np.concatenate([passing.reshape(-1), np.full(np.count_nonzero(calm), CALM_WEIGHT)])
     person = colour_model(np.concatenate([modes.colour[uncovered].reshape(-1, 3), modes.colour[calm, 0]]), weights)
-    return log_ratio(modes.colour, person, colour_model(scene, np.ones(len(scene)))).clip(-GREATEST_RATIO, GREATEST_RATIO)
-
-
-def _calm(field: _Field, labels: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Of the region's pixels (M,) those that are covered and enclosed, in large parts: trunk and legs."""
-    import cv2
-
-    parts = np.zeros(field.movement.region.shape, np.uint8)
-    parts[field.movement.region] = labels == COUNT
-    parts &= field.movement.enclosed
-    _, numbers, stats, _ = cv2.connectedComponentsWithStats(parts, connectivity=4)
-    areas = stats[:, cv2.CC_STAT_AREA] * (np.arange(len(stats)) > 0)
-    kept = (areas > 0) & (areas >= CALM_SHARE * areas.max())
-    return kept[np.asarray(numbers, np.intp)][field.movement.region]
+    return log_ratio(modes.colour, person, colour_model(scene, np.ones(len(scene))))
 
 
 def _persons_parts(covered: Mask, passing: Mask, region: Mask, ratio: NDArray[np.float64]) -> Mask:
