@@ -10,7 +10,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.bench import MONO_ROWS, MULTI_ROWS, run_bench
+from benchmarks.bench import FACTORS, MONO_ROWS, MULTI_ROWS, run_bench
 
 PAGE = Path(__file__).parent / "speed.md"
 PLACE = re.compile(r"(<!-- figures -->\n).*?(<!-- end of figures -->)", re.DOTALL)
@@ -37,7 +37,7 @@ KEYS = {
     "multi.gauss_newton_us": ("Gauss-Newton, us a particle and iteration", ".1f"),
     "multi.ratio_naive": ("plain NumPy's time over ours, forces", ".0f"),
     "multi.ratio_naive_gauss_newton": ("the same, Gauss-Newton", ".0f"),
-    "multi.forces_fps": ("frames/s from masks, `hybrid` with forces, one core", ".0f"),
+    "multi.forces_fps": ("frames/s from masks, `ni2008`, one core", ".0f"),
     "multi.fps": ("frames/s from masks, default preset, one core", ".0f"),
     "multi.chain_fps": ("frames/s from film to pose, default preset, two cores", ".0f"),
     "multi.peak_mb": ("peak memory, MB", ".0f"),
@@ -50,8 +50,8 @@ def tables(found: dict[str, Any]) -> str:
     lines = [f"{here['cpu']} ({here['llvm_cpu']}), {here['cores']} cores, {here['vectors']}; Python {here['python']}, "
              f"NumPy {here['numpy']}, Numba {here['numba']}, OpenCV {here['opencv-python-headless']}.",
              "", "| | median | least | |", "|---|---:|---:|---|"]
-    for key, name, scale, unit, _ in (*MONO_ROWS, *MULTI_ROWS):
-        lines.append(f"| {name.strip()} | {scale * raw[key]['median']:.3g} | {scale * raw[key]['least']:.3g} | {unit} |")
+    for key, name, unit, _ in (*MONO_ROWS, *MULTI_ROWS):
+        lines.append(f"| {name.strip()} | {FACTORS[unit] * raw[key]['median']:.3g} | {FACTORS[unit] * raw[key]['least']:.3g} | {unit} |")
     lines += ["", "| key | what | |", "|---|---|---:|"]
     for key, (what, form) in KEYS.items():
         if (value := found.get(key)) is not None:

@@ -66,3 +66,16 @@ def test_a_table_goes_to_its_place_in_a_page_or_to_the_end_of_a_file_without_pla
         into_page(file, name, "new")
     assert page.read_text("utf-8") == "<!-- table: kept -->\nnew\n<!-- end of table -->\n"
     assert file.read_text("utf-8") == "kept\n\nnew\n\nleft out\n\nnew\n\n"
+
+
+def test_the_page_on_speed_has_a_row_for_each_time_and_each_figure(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    page, bench = importlib.import_module("make_speed"), importlib.import_module("benchmarks.bench")
+    rows = (*bench.MONO_ROWS, *bench.MULTI_ROWS)
+    known = dict.fromkeys(("cpu", "llvm_cpu", "cores", "vectors", "python", "numpy", "numba", "opencv-python-headless"), "")
+    raw = {row[0]: {"median": 1.5, "least": 1.0} for row in rows}
+    made = page.tables({"environment": known, "raw": raw} | dict.fromkeys(page.KEYS, 2.0))
+    written = (ROOT / "docs" / "speed.md").read_text("utf-8")
+    for line in made.splitlines():
+        name = line.split("|")[1:2]
+        assert not name or f"|{name[0]}|" in written

@@ -4,7 +4,17 @@ import cv2
 import made
 import pytest
 
-from shadowpuppet.threads import THREADS_VARIABLE, MadeOnDemand, limit_threads, one_opencv_thread, thread_limit, usable_cores
+from shadowpuppet.threads import (
+    PARTS,
+    THREADS_VARIABLE,
+    MadeOnDemand,
+    in_parts,
+    limit_threads,
+    one_opencv_thread,
+    shared_out,
+    thread_limit,
+    usable_cores,
+)
 
 
 @pytest.mark.parametrize(("told", "limit"), [("1", 1), ("3", 3), ("0", None), ("", None), ("many", None), ("-2", None)])
@@ -19,6 +29,27 @@ def test_threads_are_those_that_the_environment_allows(monkeypatch, told, limit)
         assert cv2.getNumThreads() == (limit or before)
     finally:
         cv2.setNumThreads(before)
+
+
+@pytest.mark.parametrize("limit", ["1", "2", ""])
+def test_what_is_shared_out_is_done_once_each_and_its_errors_are_raised(monkeypatch, limit):
+    monkeypatch.setenv(THREADS_VARIABLE, limit)
+    done = list[int]()
+    shared_out(done.append, range(50))
+    assert sorted(done) == list(range(50))
+    with pytest.raises(ZeroDivisionError):
+        shared_out(lambda n: 1 / (n - 3), range(6))
+
+
+@pytest.mark.parametrize("number", [0, 1, 3, 4, 7, 8, 16, 17, 40, 1000])
+def test_parts_have_every_item_once_and_do_not_depend_on_the_machine(monkeypatch, number):
+    monkeypatch.setenv(THREADS_VARIABLE, "1")
+    alone = in_parts(number)
+    monkeypatch.delenv(THREADS_VARIABLE)
+    assert in_parts(number) == alone
+    assert [n for part in alone for n in range(number)[part]] == list(range(number))
+    assert len(alone) <= PARTS
+    assert len(alone) == 1 or min(part.stop - part.start for part in alone) >= PARTS
 
 
 def test_opencv_uses_one_thread_where_each_core_has_a_film_of_its_own():

@@ -14,7 +14,7 @@ from shadowpuppet.silhouette import SilhouetteSettings, learn_background
 from shadowpuppet.silhouette._kernels import classify, contrast
 from shadowpuppet.silhouette.background import FrameSampler, film_noise, learn_statistics, smoothed, to_planes
 from shadowpuppet.silhouette.boundary import LIMB_WIDTH_SHARE, SHARP_WIDTH, EdgeProfile, at_half_contrast, outline_width
-from shadowpuppet.silhouette.classifiers import AveragingClassifier
+from shadowpuppet.silhouette.classifiers import CELL, AveragingClassifier, ChannelClassifier
 
 # ---------------------------------------------------------------- eq. 1
 
@@ -241,3 +241,32 @@ def test_the_border_of_the_picture_is_no_outline(rng):
     wall, mask = scene(rng), figure()
     found = learn_background(empty_shots(rng, wall))(shot(rng, dressed(wall, mask)))
     assert found[-1, 66:95].all()
+
+
+# ---------------------------------------------------------------- the window of a frame that differs
+
+
+@pytest.mark.parametrize("place", [(20, 30), (0, 0), (60, 100)])
+def test_only_the_window_that_differs_is_classified_and_nothing_changes(rng, place, monkeypatch):
+    wall, (top, left), person = scene(rng), place, np.zeros(SIZE, bool)
+    person[top : top + 40, left : left + 16] = True
+    person[top + 10 : top + 13, left : left + 40] = True  # an arm that is narrower than a cell
+    segmenter, image = learn_background(empty_shots(rng, wall), SilhouetteSettings()), shot(rng, dressed(wall, person))
+    assert isinstance(segmenter.classifier, ChannelClassifier)
+    window = segmenter.classifier.different(image)
+    assert person[window].sum() == person.sum()
+    assert person[window].size < person.size / 2
+    small = segmenter(image)
+    monkeypatch.setattr(ChannelClassifier, "different", lambda self, image: (slice(None), slice(None)))
+    np.testing.assert_array_equal(small, segmenter(image))
+    assert small.any()
+
+
+@pytest.mark.parametrize("size", [(3, 50), (50, 2), (5, 7)])
+def test_pictures_of_less_than_a_cell_are_classified_whole(rng, size):
+    wall = scene(rng)[: size[0], : size[1]]
+    found = learn_background(empty_shots(rng, wall), SilhouetteSettings(method="brightness"))
+    assert isinstance(found.classifier, ChannelClassifier)
+    assert found(shot(rng, wall)).shape == size
+    if min(size) < CELL:
+        assert found.classifier.different(shot(rng, wall)) == (slice(None), slice(None))

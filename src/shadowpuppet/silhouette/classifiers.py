@@ -154,12 +154,12 @@ def _around(first: NDArray[np.int32], extent: NDArray[np.int32], margin: int) ->
 
 
 def means_of_cells(image: np.ndarray) -> np.ndarray:
-    """Means (H / CELL, W / CELL, ...) of the middle pixels of a picture's square cells; a last row or column of less than a cell is left
-    out."""
+    """Means (H / CELL, W / CELL, ...) of a picture's square cells; a last row or column of less than a cell is left out."""
     import cv2
 
     height, width = image.shape[0] // CELL, image.shape[1] // CELL
-    return np.asarray(cv2.resize(image[: height * CELL, : width * CELL], (width, height), interpolation=cv2.INTER_LINEAR))
+    halved = cv2.resize(image[: height * CELL, : width * CELL], (2 * width, 2 * height), interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.resize(halved, (width, height), interpolation=cv2.INTER_AREA))  # in two steps: three times as fast
 
 
 def edge_jitter(mean: np.ndarray) -> np.ndarray:

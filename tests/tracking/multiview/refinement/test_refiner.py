@@ -20,6 +20,7 @@ from shadowpuppet.body.models import make_body as make_named
 from shadowpuppet.body.skeleton import Dof, Joint, Skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import rotation_about
+from shadowpuppet.threads import THREADS_VARIABLE
 from shadowpuppet.tracking.multiview.refinement import gauss_newton
 from shadowpuppet.tracking.multiview.refinement.correspondence import make_cloud
 from shadowpuppet.tracking.multiview.refinement.part_sums import add_descendants
@@ -171,6 +172,20 @@ def test_room_that_is_used_again_remembers_nothing(seen, rng):
     of.forces(pose[None] - 0.1, other, ForceSettings(iterations=2, rho="none"))
     for before, after in zip(first, answers()):
         np.testing.assert_array_equal(before, after)
+
+
+@pytest.mark.kernels
+def test_poses_are_refined_alike_on_any_number_of_cores(seen, rng, monkeypatch):
+    body, pose, *cloud = seen
+    of, made = Refiner(body), make_cloud(*cloud)
+    poses = body.skeleton.clamp(pose + rng.normal(0, 0.1, (19, len(pose))))
+    found = []
+    for limit in ("1", "3"):
+        monkeypatch.setenv(THREADS_VARIABLE, limit)
+        found.append((of.costs(poses, made), of.forces(poses, made, ForceSettings(iterations=3)),
+                      of.gauss_newton(poses, ((made, 3, 0.05),), poses, np.full(len(pose), 1e-5))))
+    for one, three in zip(*found, strict=True):
+        np.testing.assert_array_equal(one, three)
 
 
 @pytest.mark.kernels
