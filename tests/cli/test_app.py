@@ -130,6 +130,18 @@ def test_help_lists_what_most_need_first(shell):
     assert set(cli.COMMANDS) - set(cli.FIRST) <= more
 
 
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_help_ends_with_three_examples_that_are_understood(shell, command):
+    _, shown, _ = shell(command, "--help")
+    lines = re.findall(rf"^    shadowpuppet ({command}.*)$", shown.partition("Examples:")[2], re.MULTILINE)
+    assert len(lines) == 3
+    for line in lines:
+        function, *_ = cli.app.parse_args(line, exit_on_error=False, print_error=False)
+        assert function.__name__.strip("_").replace("_", "-") == command
+        assert f"    shadowpuppet {line}" in shown.splitlines()
+        assert len(line) < 80 - len("    shadowpuppet ")
+
+
 def test_the_version_is_reported_by_the_module_too():
     child = process("--version")
     out, err = child.communicate()

@@ -9,6 +9,7 @@ from typing import Literal
 
 from cyclopts import App, CycloptsError, Group, UnusedCliTokensError
 
+from shadowpuppet.cli.examples import epilogue
 from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, is_out_of_memory, one_line, reason
 from shadowpuppet.output import say, say_text
 from shadowpuppet.removed import refuse_tokens
@@ -38,7 +39,7 @@ def _version() -> str:
 app = App(name="shadowpuppet", version=_version, help_format="plaintext", suppress_keyboard_interrupt=False,
           group_commands=_GROUPS[0], help="Markerless motion capture from silhouettes.")
 for _name, _place in COMMANDS.items():
-    app.command(f"shadowpuppet.cli.{_place}", name=_name, group=_GROUPS[_name not in FIRST])
+    app.command(f"shadowpuppet.cli.{_place}", name=_name, group=_GROUPS[_name not in FIRST], help_epilogue=epilogue(_name))
 
 
 def settings(*, preset: str = "default") -> None:

@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from functools import cached_property
+from io import SEEK_END, BufferedRandom
 from pathlib import Path
+from tempfile import TemporaryFile
+from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,35 +35,53 @@ def film_of(recording: str | Path, settings: Mapping[str, object]) -> dict[str, 
     return {"recording": str(Path(recording).resolve()), **{name: settings.get(name) for name in SHARED}}
 
 
-Packed = tuple[bytes, tuple[int, ...]]
-"""A mask's bits, compressed, and its shape (H, W)."""
+Place = tuple[int, int]
+"""Where compressed values are in a file, and their number of bytes."""
+Packed = tuple[Place, tuple[int, ...]]
+"""A mask's bits, and its shape (H, W)."""
 
 
-@dataclass
 class MaskStore:
-    """Masks of a recording's frame sets, in order, compressed; emptied once they exceed the limit."""
+    """Masks of a recording's frame sets, in order, compressed in a temporary file, as memory should not grow with a film; emptied once they
+    exceed the limit."""
 
-    limit: int = LIMIT
-    """Greatest size, bytes."""
-    size: int = 0
-    """Size of the stored masks, bytes."""
-    complete: bool = False
-    """Whether all frame sets of the recording are stored."""
-    sets: list[tuple[float, list[Packed | None], list[bytes | None], tuple[Keypoints | None, ...]]] = field(default_factory=list)
-    """For each set its time (s) and, for each camera, `Seen.masks`, where the mask is, `Seen.codes`, and `Seen.keypoints`; None for a
-    camera without them."""
+    def __init__(self, limit: int = LIMIT) -> None:
+        """`limit`: greatest size, bytes."""
+        self.limit = limit
+        self.size = 0
+        """Size of what is stored, bytes."""
+        self.complete = False
+        """Whether all frame sets of the recording are stored."""
+        self.sets: list[tuple[float, list[Packed | None], list[Place | None], tuple[Keypoints | None, ...]]] = []
+        """For each set its time (s) and, for each camera, `Seen.masks`, where the mask is, `Seen.codes`, and `Seen.keypoints`; None for a
+        camera without them."""
+
+    @cached_property
+    def _file(self) -> BufferedRandom:
+        file = TemporaryFile()  # noqa: SIM115 - closed with the store
+        finalize(self, file.close)
+        return file
 
     def add(self, time: float, seen: Seen) -> None:
         """Store one frame set's masks, and the colours in them; not the shadows."""
         if self.size > self.limit:
             self.sets.clear()
+            self._file.truncate(0)
             return
-        packed = [None if mask is None else (_compressed(np.packbits(mask)), mask.shape) for mask in seen.masks]
-        colours = [None if mask is None or each is None else _compressed(each[thinned(mask)]) for mask, each in zip(seen.masks, seen.codes)]
+        packed = [None if mask is None else (self._written(np.packbits(mask)), mask.shape) for mask in seen.masks]
+        colours = [None if mask is None or each is None else self._written(each[thinned(mask)])
+                   for mask, each in zip(seen.masks, seen.codes)]
         self.sets.append((time, packed, colours, seen.keypoints))
-        self.size += sum(len(one[0]) for one in packed if one is not None)
-        self.size += sum(len(one) for one in colours if one is not None)
         self.size += sum(each.xy.nbytes + each.confidence.nbytes for each in seen.keypoints if each is not None)
+
+    def _written(self, values: NDArray) -> Place:
+        begin = self._file.seek(0, SEEK_END)
+        self.size += (number := self._file.write(zlib.compress(values.tobytes(), 1)))
+        return begin, number
+
+    def _read(self, place: Place, kind: type[np.number]) -> NDArray:
+        self._file.seek(place[0])
+        return np.frombuffer(zlib.decompress(self._file.read(place[1])), kind)
 
     def __iter__(self) -> Iterator[FrameSet]:
         """The stored frame sets, without images."""
@@ -72,9 +93,24 @@ class MaskStore:
 
     def _frame_set(self, n: int) -> FrameSet:
         time, packed, colours, keypoints = self.sets[n]
-        masks = tuple(map(_unpacked, packed))
-        seen = Seen(masks, codes=tuple(map(_codes, masks, colours)), keypoints=keypoints)
+        masks = tuple(map(self._mask, packed))
+        seen = Seen(masks, codes=tuple(map(self._codes, masks, colours)), keypoints=keypoints)
         return FrameSet(time, (None,) * len(packed), seen)
+
+    def _mask(self, packed: Packed | None) -> Mask | None:
+        if packed is None:
+            return None
+        place, shape = packed
+        return np.unpackbits(self._read(place, np.uint8), count=int(np.prod(shape))).reshape(shape).view(np.bool_)
+
+    def _codes(self, mask: Mask | None, place: Place | None) -> ColourCode | None:
+        """Colours in a mask (H, W), and 0 elsewhere."""
+        if mask is None or place is None:
+            return None
+        inside = thinned(mask)
+        codes = np.zeros(inside.shape, np.uint16)
+        codes[inside] = self._read(place, np.uint16)
+        return codes
 
     def stored(self, frames: Iterable[FrameSet]) -> Generator[FrameSet]:
         """Pass frame sets on, and store their masks."""
@@ -82,27 +118,6 @@ class MaskStore:
             self.add(each.time, each.seen)
             yield each
         self.complete = self.size <= self.limit
-
-
-def _compressed(values: NDArray) -> bytes:
-    return zlib.compress(values.tobytes(), 1)
-
-
-def _unpacked(packed: Packed | None) -> Mask | None:
-    if packed is None:
-        return None
-    bits, shape = packed
-    return np.unpackbits(np.frombuffer(zlib.decompress(bits), np.uint8), count=int(np.prod(shape))).reshape(shape).view(np.bool_)
-
-
-def _codes(mask: Mask | None, packed: bytes | None) -> ColourCode | None:
-    """Colours in a mask (H, W), and 0 elsewhere."""
-    if mask is None or packed is None:
-        return None
-    inside = thinned(mask)
-    codes = np.zeros(inside.shape, np.uint16)
-    codes[inside] = np.frombuffer(zlib.decompress(packed), np.uint16)
-    return codes
 
 
 def _state(rig: Rig) -> dict[str, object]:

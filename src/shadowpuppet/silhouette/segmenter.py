@@ -53,9 +53,9 @@ class Segmenter:
     2. Undo what has changed since the empty scene (`correction.frame_correction.Correction`): the camera's movement
        (`correction.registration.Registration`), the gain of exposure, white balance and lamps (`correction.light.Light`), and
        the detail that compression has taken (`correction.detail.LostDetail`).
-    3. Classify every pixel (`classifier`): convert to Y, Cr, Cb, smooth (`background.smoothed`), compare with the background in units of
-       its standard deviation (`_kernels.classify`), and decide between dark limbs and shadows (`shadows.resolve_shadows`).
-       `averaging` and `mog2` have comparisons of their own.
+    3. Classify every pixel of the rows and columns that differ (`classifier`): convert to Y, Cr, Cb, smooth (`background.smoothed`),
+       compare with the background in units of its standard deviation (`_kernels.classify`), and decide between dark limbs and shadows
+       (`shadows.resolve_shadows`). `averaging` and `mog2` have comparisons of their own.
     4. Clean up (`cleanup.clean`, if the setting `clean` asks for it): remove specks, keep the largest part and what nearly touches it,
        move the outline to half the contrast of the unsmoothed frame (`boundary.at_half_contrast`), fill small holes.
 
