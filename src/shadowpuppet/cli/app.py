@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 import sys
+import tomllib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Literal
 
 from cyclopts import App, CycloptsError, Group, UnusedCliTokensError
 
-from shadowpuppet.cli.examples import epilogue
 from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, is_out_of_memory, one_line, reason
 from shadowpuppet.output import say, say_text
 from shadowpuppet.removed import refuse_tokens
@@ -38,8 +39,17 @@ def _version() -> str:
 
 app = App(name="shadowpuppet", version=_version, help_format="plaintext", suppress_keyboard_interrupt=False,
           group_commands=_GROUPS[0], help="Markerless motion capture from silhouettes.")
+EXAMPLES: dict[str, dict[str, str]] = tomllib.loads(Path(__file__).with_name("examples.toml").read_text("utf-8"))
+"""What follows each command in its examples, and what these are for."""
+
+
+def _epilogue(command: str) -> str:
+    lines = ((f"shadowpuppet {command} {arguments}".rstrip(), what) for arguments, what in EXAMPLES[command].items())
+    return "\n".join(["Examples:\n", *(f"    {line}\n        {what}" for line, what in lines)])
+
+
 for _name, _place in COMMANDS.items():
-    app.command(f"shadowpuppet.cli.{_place}", name=_name, group=_GROUPS[_name not in FIRST], help_epilogue=epilogue(_name))
+    app.command(f"shadowpuppet.cli.{_place}", name=_name, group=_GROUPS[_name not in FIRST], help_epilogue=_epilogue(_name))
 
 
 def settings(*, preset: str = "default") -> None:
