@@ -44,6 +44,8 @@ ROUNDING_MARGIN = 1 - 1e-4
 
 CELL = 4
 """Side (pixels) of the cells whose means show where a frame differs."""
+WHOLE: Window = slice(None), slice(None)
+"""All rows and columns."""
 EDGE_JITTER = 0.05
 """Standard deviation added at the background's edges, over the change of its value across a pixel: cameras shake."""
 
@@ -80,8 +82,6 @@ class ChannelClassifier:
         out, shadow = np.zeros(image.shape[:2], np.uint8), np.zeros(image.shape[:2], bool) if resolved else None
         if not (inner := image[window]).size:
             return out, shadow
-        if inner.size > image.size / 2:  # little is saved
-            inner, window = image, (slice(None), slice(None))
         smooth, part = smoothed(to_planes(inner), self.smoothing), self.within(window)
         label = part.labels(smooth, MAX_SHADE if resolved else 0.0)
         if shadow is not None:
@@ -113,17 +113,18 @@ class ChannelClassifier:
         import cv2
 
         if min(image.shape[:2]) < CELL:
-            return slice(None), slice(None)
+            return WHOLE
         differ = ~np.asarray(cv2.inRange(to_planes(means_of_cells(image)), *self._background_of_cells), np.uint8)
         left, top, width, height, area = cv2.connectedComponentsWithStats(differ)[2][1:].T
         if not len(area):
             return slice(0), slice(0)
         large, gap = area >= MIN_PART_SHARE * area.max(), CELL + math.ceil(CELL * MAX_PART_GAP * area.sum() ** 0.5)
-        return _around(top[large], height[large], gap), _around(left[large], width[large], gap)
+        window = _around(top[large], height[large], gap), _around(left[large], width[large], gap)
+        return WHOLE if image[window].size > image.size / 2 else window  # little is saved
 
     def within(self, window: Window) -> ChannelClassifier:
         """The classifier of a window of rows and columns of pictures."""
-        if window == (slice(None), slice(None)):
+        if window == WHOLE:
             return self
         part = replace(self, mean=np.ascontiguousarray(self.mean[window]), inverse_sigma=np.ascontiguousarray(self.inverse_sigma[window]))
         part.__dict__["surely_background"] = tuple(bound[window] for bound in self.surely_background)  # not computed anew

@@ -111,7 +111,7 @@ def place_parts(T, origin, joints, rotations, starts, parts):  # pragma: no cove
 def closest_on_part(q, rows, out):  # pragma: no cover
     """Fill out (8 LANES,) for a group of points (7 LANES,) and one part q (PART_NUMBERS,): signed distance, cosine between the normals,
     closest point (3) and its outward normal (3), the last two in the part's frame."""
-    if min(q[23], q[24]) > FLAT:
+    if _is_round(q):
         for i in range(LANES):
             _enter(out, i, _closest_if_round(q, rows, i))
     else:
@@ -133,33 +133,32 @@ def _compete(q, number, rows, epsilon, choice, near):  # pragma: no cover
     for i in range(LANES):
         d, cosine, _, _, _, _, _, _ = _closest(q, rows, i)
         d = abs(d)
-        apart = d * (one - choice * cosine)
-        closer = apart < near[2 * LANES + i]
-        near[i] = d * (one - epsilon * cosine) if closer else near[i]  # eq. 31
-        near[LANES + i] = number if closer else near[LANES + i]
-        near[2 * LANES + i] = apart if closer else near[2 * LANES + i]
+        _enter_if_closer(near, i, number, d * (one - epsilon * cosine), d * (one - choice * cosine))  # eq. 31
 
 
 @reduction_kernel
 def _compete_by_distance(q, number, rows, near):  # pragma: no cover
     """As `_compete` without normals."""
     for i in range(LANES):
-        _enter_if_closer(near, i, number, abs(_closest(q, rows, i)[0]))
+        d = abs(_closest(q, rows, i)[0])
+        _enter_if_closer(near, i, number, d, d)
 
 
 @reduction_kernel
 def _compete_if_round(q, number, rows, near):  # pragma: no cover
     """As `_compete_by_distance` for a part with domed ends."""
     for i in range(LANES):
-        _enter_if_closer(near, i, number, abs(_closest_if_round(q, rows, i)[0]))
+        d = abs(_closest_if_round(q, rows, i)[0])
+        _enter_if_closer(near, i, number, d, d)
 
 
 @device
-def _enter_if_closer(near, i, number, d):  # pragma: no cover
-    closer = d < near[2 * LANES + i]
-    near[i] = d if closer else near[i]
+def _enter_if_closer(near, i, number, distance, apart):  # pragma: no cover
+    """Enter a part, its distance and that by which parts are chosen, for point i, if it is closer by the latter."""
+    closer = apart < near[2 * LANES + i]
+    near[i] = distance if closer else near[i]
     near[LANES + i] = number if closer else near[LANES + i]
-    near[2 * LANES + i] = d if closer else near[2 * LANES + i]
+    near[2 * LANES + i] = apart if closer else near[2 * LANES + i]
 
 
 @reduction_kernel
@@ -181,7 +180,7 @@ def nearest(parts, rows, sphere, epsilon, choice, near):  # pragma: no cover
         if gap * (np.float32(1) - choice) <= worst:
             if choice != 0 or epsilon != 0:
                 _compete(q, number, rows, epsilon, choice, near)
-            elif min(q[23], q[24]) > FLAT:
+            elif _is_round(q):
                 _compete_if_round(q, number, rows, near)
             else:
                 _compete_by_distance(q, number, rows, near)
@@ -220,6 +219,12 @@ def _load(q, rows, i):  # pragma: no cover
     nx, ny, nz = rows[3 * LANES + i], rows[4 * LANES + i], rows[5 * LANES + i]
     return (q[0] * x + q[1] * y + q[2] * z, q[3] * x + q[4] * y + q[5] * z, q[6] * x + q[7] * y + q[8] * z,
             q[0] * nx + q[1] * ny + q[2] * nz, q[3] * nx + q[4] * ny + q[5] * nz, q[6] * nx + q[7] * ny + q[8] * nz)
+
+
+@device
+def _is_round(q):  # pragma: no cover
+    """Whether both ends of part q are domed."""
+    return min(q[23], q[24]) > FLAT
 
 
 @device

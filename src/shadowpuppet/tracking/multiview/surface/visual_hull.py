@@ -7,7 +7,7 @@ silhouettes (Matusik et al. 2000, "Image-based visual hulls").
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import cache
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -172,7 +172,7 @@ def _view(camera: Camera) -> _View:
     return _view_through(camera.size, tuple(camera.matrix.ravel().tolist()), tuple(camera.distortion.tolist()), camera.fisheye)
 
 
-@cache
+@lru_cache
 def _view_through(size: tuple[int, int], matrix: tuple[float, ...], distortion: tuple[float, ...], fisheye: bool) -> _View:
     camera = Camera("lens", size, np.reshape(matrix, (3, 3)), np.array(distortion), fisheye=fisheye)
     (width, height), lens = camera.size, make_lens(camera)
