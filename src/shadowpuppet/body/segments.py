@@ -24,8 +24,6 @@ SEGMENT_JOINTS = _both(("pelvis", "torso", "chest", "head"), ("shoulder", "elbow
 """Joints that each segment may have."""
 PULLED_POINTS = _both(("left_shoulder", "right_shoulder"), ("elbow", "hand"), ("knee", "ankle"))
 """Landmarks by which the motion cost pulls each segment to its last position."""
-UNOBSERVED_DOFS = ("root_x",)
-"""DOF that one camera's silhouettes do not show: the person's distance stays as initialised."""
 
 
 def segments_of(skeleton: Skeleton) -> tuple[str, ...]:
@@ -39,8 +37,8 @@ def limbs_of(skeleton: Skeleton) -> tuple[str, ...]:
 
 
 def dofs_of(skeleton: Skeleton, segment: str) -> NDArray[np.int64]:
-    """Indices of a segment's DOF, without `UNOBSERVED_DOFS`."""
-    return np.flatnonzero([dof.joint in SEGMENT_JOINTS[segment] and dof.name not in UNOBSERVED_DOFS for dof in skeleton.dofs])
+    """Indices of a segment's DOF."""
+    return np.flatnonzero([dof.joint in SEGMENT_JOINTS[segment] for dof in skeleton.dofs])
 
 
 def parts_of(body: Body, segment: str) -> list[str]:

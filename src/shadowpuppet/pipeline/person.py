@@ -116,8 +116,9 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
         """What the body leaves unexplained in most of some masks (H, W), in the poses that fit each best; None if nothing is."""
         unexplained, looks = None, max(1, round(MOST * len(masks)))
         pose = None
-        for mask in masks:
-            pose = self.tracker.search(mask).pose
+        for k, mask in enumerate(masks):
+            whole = self.body.hem is None  # whose coarse legs may leave the feet out
+            pose = self.tracker.start(np.random.default_rng(k), mask).pose if whole else self.tracker.search(mask).pose
             legs = self.picture.legs(pose) if self.tracker.settings.ignore_legs else None
             unexplained = look_beside(unexplained, mask, self.picture.mask(pose), looks, legs)
         if pose is None or unexplained is None or not unexplained.stays.any():

@@ -29,6 +29,9 @@ class Observation:
     arms: PartObservation | None = None
     """What shows some parts of the arms alone, if anything does."""
 
+    soles: float | None = None
+    """The row of the picture, pixels, in which a whole person's soles are; None if it is not known."""
+
     @classmethod
     def of(cls, mask: ArrayLike, ignore: ArrayLike | None = None, also: Cost | None = None) -> Observation:
         """The observation of a mask (H, W), with a mask (H, W) of the ignored pixels."""

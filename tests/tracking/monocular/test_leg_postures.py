@@ -82,9 +82,10 @@ def test_feet_below_the_floor_cost_and_the_lowest_point_off_it_where_contact_is_
     above = low + 0.1
     assert floor_cost(view, above, 100.0)(pose)[0] == pytest.approx(100 * (np.minimum(heights - above, 0) ** 2).sum())
     for off in (0.1, -0.1):
-        assert contact_cost(view, low - off, 100.0)(pose)[0] == pytest.approx(1 / (1 + (0.1 / leg_postures.REACH) ** 2))
+        far = leg_postures.REACH**2
+        assert contact_cost(view, low - off, 100.0)(pose)[0] == pytest.approx(200 * far * (np.sqrt(1 + 0.1**2 / far) - 1), rel=1e-3)
     assert contact_cost(view, low, 100.0)(pose)[0] == pytest.approx(0)
-    assert contact_cost(view, low - 5.0, 100.0)(pose)[0] < 100 * leg_postures.REACH**2  # who jumps is not held
+    assert contact_cost(view, low - 5.0, 100.0)(pose)[0] < 200 * leg_postures.REACH * 5  # who jumps is held less than by the square
 
 
 @pytest.mark.parametrize("name", WHOLE)
@@ -93,8 +94,8 @@ def test_stages_of_legs_know_the_floor_and_those_of_arms_do_not(name):
     settings = make_settings(overrides={"body": name, "motion_weight": 0.0})
     standing = view.body.skeleton.pose()[None]
     observation = Observation.of(view.mask(standing[0]))
-    for part, number in (("left_leg", 2), ("left_arm", 1)):
+    for part, number in (("left_leg", 3), ("left_arm", 1)):
         costs = make_stage(view, settings, part, floor=0.0).extra_costs(observation, standing[0])
         assert len(costs) == number
-        assert (sum(cost(standing)[0] for cost in costs) > 1000) == (number == 2)
+        assert (sum(cost(standing)[0] for cost in costs) > 1000) == (number == 3)
     assert len(make_stage(view, settings, "left_leg").extra_costs(observation, standing[0])) == 1

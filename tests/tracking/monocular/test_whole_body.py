@@ -147,7 +147,7 @@ def test_who_moves_arms_and_legs_is_followed(name):
     shown = view.points(np.stack([pose, state.pose]), names=["left_knee", "left_ankle", "left_elbow"])
     seen = shown[..., :2] / shown[..., 2:]
     assert np.abs(seen[0] - seen[1]).max() * CAMERA.matrix[0, 0] < 15  # pixels, of 170 that the person is tall
-    assert state.pose[view.body.skeleton.dof_names.index("root_x")] == 0  # the distance is not sought
+    assert abs(state.pose[view.body.skeleton.dof_names.index("root_x")]) < 0.05 * FAR
 
 
 @pytest.mark.parametrize(("overrides", "again"), [({}, True), ({"turned": False}, False)])

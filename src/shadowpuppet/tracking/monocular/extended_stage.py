@@ -11,56 +11,77 @@ from shadowpuppet.body.segments import PULLED_POINTS, coarse_limbs
 from shadowpuppet.body.upper_body import TWIST
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
-from shadowpuppet.tracking.monocular.leg_postures import FLOOR_WEIGHT, floor_cost, posture_penalty
+from shadowpuppet.tracking.monocular.leg_postures import posture_penalty, soles_cost, standing_costs
 from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.stages import FilterStage
 from shadowpuppet.tracking.particle_filter import Particles, Propose
 from shadowpuppet.tracking.resampling import Scheme, normalise
 from shadowpuppet.tracking.silhouette_cost import Cost, Observation
 
+HEADING = "root_heading"
+"""The DOF that turns a whole body about the vertical, explored about where it was: no direction is more usual than another."""
 TORSO_SPREAD, LIMB_SPREAD = 0.3, 0.2
 """Standard deviations (rad) of explored candidates: the torso's angles about upright, a limb's about a coarse posture."""
 TURNED_SHARE = 0.5
 """Share of the torso's explored candidates that are turned anywhere, in a silhouette too narrow for the trunk as it was."""
 MEAN_TEMPERATURE = 50.0
 """For the mean estimate: a particle's weight falls to 1/e for this much more cost (pixels at 320 x 240)."""
+SOLES_ERROR = 1.0
+"""Standard deviation of the silhouette's last row (pixels at 320 x 240)."""
+WIDE = 5.0
+"""Standard deviation of the places of explored candidates, over the noise of a frame."""
+MOVED_SHARE = 2 / 3
+"""Share of a whole torso's explored candidates that are moved as a whole: half of them to where the silhouette ends, half nearer or
+farther."""
 
 
-def make_stage(picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None,
-               floor: float | None = None) -> FilterStage:
+def make_stage(picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None, floor: float | None = None,
+               moves: bool = True) -> FilterStage:
     """The paper's stage, or the extended one if the settings use any extension. `floor`: its height in the world,
     metres, if it is known. Other arguments and errors: as for `FilterStage`."""
     extended = settings.explore or settings.motion_weight or settings.posture_weight or settings.estimate != "best"
-    return ExtendedStage(picture, settings, name, scheme, floor) if extended else FilterStage(picture, settings, name, scheme)
+    return ExtendedStage(picture, settings, name, scheme, floor, moves) if extended else FilterStage(picture, settings, name, scheme)
 
 
 class ExtendedStage(FilterStage):
     """A stage with exploration, a pull to usual postures, a pull to the last frame, and a mean estimate, as set in the settings."""
 
-    def __init__(self, picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None,
-                 floor: float | None = None) -> None:
+    def __init__(self, picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None, floor: float | None = None,
+                 moves: bool = True) -> None:
         """Arguments and errors as for `make_stage`."""
-        super().__init__(picture, settings, name, scheme)
-        self.floor = floor if settings.posture_weight and any(part.endswith("leg") for part in self.parts) else None
+        super().__init__(picture, settings, name, scheme, moves)
+        legs = any(part.endswith("leg") for part in self.parts)
+        self.moves_feet = (legs or self.moves_torso) and "left_toe" in picture.body.landmark_names
+        self.floor = floor if settings.posture_weight and legs else None
+        self.turns = np.array([picture.body.skeleton.dofs[d].name == HEADING for d in self.dofs])
 
-    def propose(self, cycle: int, narrow: bool = False) -> Propose:
+    def propose(self, cycle: int, narrow: bool = False, stands: Array | None = None) -> Propose:
         """The paper's noise; in the first cycle of a stage of one part also `explore` candidates."""
-        noise, number = super().propose(cycle), self.settings.explore
+        noise, number = super().propose(cycle, stands=stands), self.settings.explore
         if cycle or len(self.parts) > 1 or not number:
             return noise
-        return lambda rng, values: np.concatenate([noise(rng, values), self.clamp(self.explore(rng, values[0], number, narrow))])
+        return lambda rng, values: np.concatenate([noise(rng, values), self.clamp(self.explore(rng, values[0], number, narrow, stands))])
 
-    def explore(self, rng: np.random.Generator, best: Array, number: int, narrow: bool = False) -> Array:
-        """Values (number, d) from the part's whole range, which the noise of one frame cannot reach from `best` (d,). `narrow`: as in
+    def explore(self, rng: np.random.Generator, best: Array, number: int, narrow: bool = False, stands: Array | None = None) -> Array:
+        """Values (number, d) from the part's whole range, which the noise of one frame cannot reach from `best` (d,). Others: as in
         `propose`."""
         if self.moves_torso:
-            spread = np.where(self.rotates, TORSO_SPREAD, 5 * self.settings.torso.sigma_translation)
-            values = np.where(self.rotates, 0.0, best) + rng.standard_normal((number, len(best))) * spread
+            spread = np.where(self.rotates, TORSO_SPREAD, WIDE * self.noise(stands))
+            values = np.where(self.rotates & ~self.turns, 0.0, best) + rng.standard_normal((number, len(best))) * spread
             if narrow:
                 self._turn(rng, values[: round(TURNED_SHARE * number)], best)
+            if stands is not None:
+                self._move(rng, values[: round(MOVED_SHARE * number)], best, stands)
             return values
         limbs = coarse_limbs(self.picture.body.skeleton, self.parts[0])
         return limbs[rng.integers(len(limbs), size=number)] + LIMB_SPREAD * rng.standard_normal((number, len(best)))
+
+    def _move(self, rng: np.random.Generator, values: Array, best: Array, stands: Array) -> None:
+        """Fill values (N, d) with the torso as in `best` (d,), but at the place of the pose `stands` (D,), or nearer or farther."""
+        there, noise = len(values) // 2, rng.standard_normal(values.shape) * self.sigma
+        values[:] = best
+        values[:there] += noise[:there] + np.where(self.rotates, 0.0, stands[self.dofs] - best)
+        values[there:] += np.where(self.rotates, 0.0, np.where(self.deep, WIDE, 1.0) * noise[there:])
 
     def _turn(self, rng: np.random.Generator, values: Array, best: Array) -> None:
         """Fill values (N, d) with the torso as in `best` (d,), but turned anywhere to its side: the other side looks the same, and the mean
@@ -75,7 +96,9 @@ class ExtendedStage(FilterStage):
         """The pulls to usual postures and to the last frame's estimate (D,), and the caller's own cost."""
         posture, motion = self.settings.posture_weight * self.scale, self.settings.motion_weight * self.scale
         costs: list[Cost] = [lambda poses: posture * posture_penalty(self.picture.body.skeleton, poses)] if posture else []
-        costs += [] if self.floor is None else [floor_cost(self.picture, self.floor, FLOOR_WEIGHT * self.scale)]
+        costs += [] if self.floor is None else standing_costs(self.picture, self.floor)
+        if observation.soles is not None and self.moves_feet:
+            costs += [soles_cost(self.picture, observation.soles, MEAN_TEMPERATURE / (2 * SOLES_ERROR**2))]
         costs += [self._motion_cost(motion, last)] if motion else []
         return costs + super().extra_costs(observation, last)
 

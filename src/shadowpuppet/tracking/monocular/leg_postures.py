@@ -14,6 +14,7 @@ from shadowpuppet.body.segments import dofs_of, leg_postures, limbs_of
 from shadowpuppet.body.skeleton import Skeleton, bounded
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.monocular.settings import pixel_scale
 from shadowpuppet.tracking.silhouette_cost import Cost
 
 USUAL = np.radians([(50, 70, -15), (88, 90, 0), (110, 120, -25), (0, 90, 55)])
@@ -27,8 +28,9 @@ ABOVE_FLOOR, BELOW_FEET = 0.05, 0.15
 FLOOR_WEIGHT = 5000.0
 """Cost of a point of the feet or a knee below the floor (pixels per m^2, at 320 x 240)."""
 CONTACT_WEIGHT, REACH = 20000.0, 0.15
-"""Cost of the body's lowest point off the floor, where the person's place is looked for, in the same unit; and the distance (m) at which it
-no longer grows much."""
+"""Cost of both feet off the floor, in the same unit; and the distance (m) from which it grows in proportion only."""
+SOLES_REACH = 4.5
+"""Distance (pixels at 320 x 240) of the soles from the silhouette's last row at which its cost no longer grows much."""
 
 
 def posture_penalty(skeleton: Skeleton, poses: Array) -> Array:
@@ -69,16 +71,40 @@ def floor_below(picture: Picture) -> float | None:
     return 0.0 if ankles - BELOW_FEET <= 0 <= hips - ABOVE_FLOOR else None
 
 
-def contact_cost(picture: Picture, level: float, weight: float) -> Cost:
-    """The cost (N,) of poses (N, D) whose lowest point is above or below a floor at a height `level` (m) in the world; `weight`: per m^2.
-    It is bounded: a person may jump, or sit with hanging feet."""
-    names = _lowest(picture)
+def soles_cost(picture: Picture, row: float, weight: float) -> Cost:
+    """The cost (N,) of poses (N, D) whose lowest sole is not in a row of the picture, where the silhouette ends; `weight`: per squared
+    pixel at 320 x 240. It is bounded: shoes may be like the floor. The silhouette's sides say less of the distance: clothes make a person
+    wider by an unknown share."""
+    camera, unit = picture.camera, pixel_scale(picture.camera.size)
+    names = [f"{side}_{name}" for side in ("left", "right") for name in ("heel", "toe")]
 
     def cost(poses: Array) -> Array:
-        squared = (picture.points_world(poses, names)[..., 2].min(1) - level) ** 2
-        return weight * squared / (1 + squared / REACH**2)
+        squared = (camera.project(picture.points_world(poses, names))[..., 1].max(1) - row) ** 2 / unit
+        return weight * unit * np.where(np.isfinite(squared), squared / (1 + squared / SOLES_REACH**2), SOLES_REACH**2)
 
     return cost
+
+
+def contact_cost(picture: Picture, level: float, weight: float) -> Cost:
+    """The cost (N,) of poses (N, D) none of whose feet stands on a floor at a height `level` (m) in the world; `weight`: per m^2. A foot
+    stands on heel and toes; who kneels is on knee and toes. It grows in proportion far
+    away: a person may jump, or sit with hanging feet."""
+    known, sides = picture.body.landmark_names, ("left", "right")
+    feet = [[f"{side}_{name}" for name in names] for side in sides for names in (("heel", "toe"), ("knee", "toe"))]
+    if any(name not in known for names in feet for name in names):
+        feet = [[name] for name in _lowest(picture)]
+
+    def cost(poses: Array) -> Array:
+        squared = np.min([((picture.points_world(poses, names)[..., 2] - level) ** 2).mean(1) for names in feet], axis=0)
+        return weight * 2 * REACH**2 * (np.sqrt(1 + squared / REACH**2) - 1)
+
+    return cost
+
+
+def standing_costs(picture: Picture, level: float) -> list[Cost]:
+    """What speaks against poses on a floor at a height `level` (m) in the world: feet below it, and feet off it."""
+    scale = pixel_scale(picture.camera.size)
+    return [floor_cost(picture, level, FLOOR_WEIGHT * scale), contact_cost(picture, level, CONTACT_WEIGHT * scale)]
 
 
 def floor_cost(picture: Picture, level: float, weight: float) -> Cost:

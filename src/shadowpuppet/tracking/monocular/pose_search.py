@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body.segments import coarse_limbs, dofs_of, limbs_of, parts_of
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.monocular.standing_place import PLACE, standing_place
 from shadowpuppet.tracking.silhouette_cost import Observation, PartialCost, silhouette_costs
 from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
 
@@ -64,13 +65,18 @@ def search_pose(picture: Picture, mask: NDArray[np.bool_], start: Array | None =
     return CoarsePose(pose, least, tried, observation.cost_and_overlap(picture.draw(pose))[1])
 
 
-def search_turned(picture: Picture, mask: NDArray[np.bool_]) -> CoarsePose:
+def search_turned(picture: Picture, mask: NDArray[np.bool_], floor: float | None = None, moves: bool = True) -> CoarsePose:
     """As `search_pose`; if the person who faces the camera at the fitted height fits badly, the best of those who are turned, and, with a
-    whole body, sit, kneel or squat lower or stand higher."""
+    whole body, sit, kneel or squat lower or stand higher. A whole person, unless not `moves`, may be where the silhouette ends, too, on a
+    floor at a height in the world, metres, or at the distance of their stature."""
     found = search_pose(picture, mask)
+    stands = standing_place(picture, mask, floor, np.zeros(len(picture.body.skeleton.dofs))) if moves else None
+    if stands is not None:
+        found = max(found, search_pose(picture, mask, stands), key=lambda each: each.overlap)
     if found.overlap >= UNCERTAIN_OVERLAP or not mask.any():
         return found
-    starts = [start for upright in _heights(picture, mask) for start in _turned(picture, upright)]
+    heights = [*_heights(picture, mask), *([] if stands is None else [stands])]
+    starts = [start for upright in heights for start in _turned(picture, upright)]
     return max([found, *(search_pose(picture, mask, start) for start in starts)], key=lambda each: each.overlap)
 
 
@@ -107,10 +113,13 @@ def _sideways(picture: Picture, pose: Array) -> tuple[NDArray[np.int64], Array]:
     skeleton = picture.body.skeleton
     sideways = skeleton.dof_indices([name for name in SIDEWAYS_DOFS if name in skeleton.dof_names])
     poses = np.repeat(pose[None], PLACES, axis=0)
-    poses[:, sideways[0]] = np.linspace(-1, 1, len(poses)) * _half_width(picture)
+    poses[:, sideways[0]] = np.linspace(-1, 1, len(poses)) * _half_width(picture, pose)
     return sideways, poses
 
 
-def _half_width(picture: Picture) -> float:
-    """Half the width visible at the body's distance, metres."""
-    return abs(float(picture.T_camera_base[2, 3])) * picture.camera.size[0] / 2 / picture.camera.matrix[0, 0]
+def _half_width(picture: Picture, pose: Array) -> float:
+    """Half the width visible at the distance of a pose (D,), metres."""
+    skeleton, place = picture.body.skeleton, picture.T_camera_base[:3, 3]
+    if PLACE[0] in skeleton.dof_names:
+        place = place + picture.T_camera_base[:3, :3] @ pose[skeleton.dof_indices(PLACE)]
+    return abs(float(place[2])) * picture.camera.size[0] / 2 / picture.camera.matrix[0, 0]

@@ -9,6 +9,7 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import SettingsError, choices
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
+from shadowpuppet.tracking.monocular.standing_place import PLACE
 from shadowpuppet.tracking.particle_filter import Particles, Propose, Weigh, diffuse
 from shadowpuppet.tracking.resampling import Indices, Scheme, make_scheme, with_best
 from shadowpuppet.tracking.silhouette_cost import Cost, Observation, PartialCost
@@ -17,15 +18,16 @@ from shadowpuppet.tracking.silhouette_cost import Cost, Observation, PartialCost
 class FilterStage:
     """One stage: its particles are values (N, d) of its own DOF; all other DOF are as last estimated."""
 
-    def __init__(self, picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None) -> None:
-        """`name`: parts joined by +; `scheme`: in place of the settings' resampling. Raises `SettingsError` for an unknown part."""
+    def __init__(self, picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None, moves: bool = True) -> None:
+        """`name`: parts joined by +; `scheme`: in place of the settings' resampling; `moves`: whether a whole body's distance is estimated.
+        Raises `SettingsError` for an unknown part."""
         self.picture, self.settings = picture, settings
         self.parts = tuple(dict.fromkeys(part.strip() for part in name.split("+")))
         skeleton = picture.body.skeleton
         unknown = [part for part in self.parts if part not in segments_of(skeleton)]
         if unknown:
             raise SettingsError(f"stages: unknown part {unknown[0]!r} in {name!r}; there are: {choices(segments_of(skeleton))}")
-        part_of = {d: part for part in self.parts for d in dofs_of(skeleton, part).tolist()}
+        part_of = {d: part for part in self.parts for d in dofs_of(skeleton, part).tolist() if moves or skeleton.dofs[d].name != PLACE[0]}
         self.dofs = np.array(sorted(part_of), np.int64)
         self.other_legs = [limb for limb in limbs_of(skeleton) if limb.endswith("leg") and limb not in self.parts]
         self.moves_torso = "torso" in self.parts
@@ -38,6 +40,7 @@ class FilterStage:
         table = {part: settings.torso if part == "torso" else settings.arm for part in self.parts}  # columns of Table I
         self.number = sum(part.particles for part in table.values())
         self.resample = make_scheme(settings.resampling, table[self.parts[0]].survival) if scheme is None else with_best(scheme)
+        self.deep = np.array([skeleton.dofs[d].name == PLACE[0] for d in self.dofs])
         self.rotates = np.array([skeleton.dofs[d].kind != "translation" for d in self.dofs])
         self.sigma = np.array([table[part_of[d]].sigma_rotation if rotates else table[part_of[d]].sigma_translation
                                for d, rotates in zip(self.dofs.tolist(), self.rotates, strict=True)])
@@ -57,11 +60,16 @@ class FilterStage:
             poses = keep_limb_directions(self.picture.body.skeleton, pose, poses, self.other_legs)
         return poses if values.ndim == 2 else poses[0]
 
-    def propose(self, cycle: int, narrow: bool = False) -> Propose:
+    def propose(self, cycle: int, narrow: bool = False, stands: Array | None = None) -> Propose:
         """Gaussian noise on every particle but the first (Algorithms 3 and 4), multiplied by `cooling` for every further cycle. `narrow`:
-        whether the silhouette is too narrow for the trunk as it was, which only the extended stage uses."""
-        sigma = self.sigma * self.settings.cooling**cycle
+        whether the silhouette is too narrow for the trunk as it was, which only the extended stage uses; `stands`: a whole body's upright
+        pose (D,) where the silhouette ends: without it the distance stays."""
+        sigma = self.noise(stands) * self.settings.cooling**cycle
         return lambda rng, values: self.clamp(diffuse(rng, values, sigma))
+
+    def noise(self, stands: Array | None) -> Array:
+        """Standard deviations (d,) of the noise; none of the distance where the silhouette does not show it. `stands`: as in `propose`."""
+        return np.where(self.deep & (stands is None), 0.0, self.sigma)
 
     def selection(self, particles: Particles, weigh: Weigh) -> Scheme:
         """The resampling of last frame's particles (Algorithms 3 and 4), by what `rank_by` reads eq. 8 to mean. `weigh`: in this frame."""

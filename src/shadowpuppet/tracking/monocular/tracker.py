@@ -18,10 +18,11 @@ from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.arm_colours import WELL, ArmColours, ColourCounts
 from shadowpuppet.tracking.monocular import pose_search
-from shadowpuppet.tracking.monocular.extended_stage import make_stage
+from shadowpuppet.tracking.monocular.extended_stage import HEADING, make_stage
 from shadowpuppet.tracking.monocular.leg_postures import FLOOR_WEIGHT, floor_below, floor_cost, posture_penalty
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.stages import FilterStage
+from shadowpuppet.tracking.monocular.standing_place import PLACE, soles_row, standing_place
 from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate, step
 from shadowpuppet.tracking.recovery import settle, track_or_recover
 from shadowpuppet.tracking.resampling import Scheme
@@ -83,6 +84,9 @@ class MonocularTracker:
     """A resampling scheme of your own, in place of the settings'."""
     looks: int = 0
     """Number of frames after which parts of the silhouettes that the body does not explain are left out; 0: never."""
+    moves: bool = True
+    """Whether a whole person's distance is estimated in every frame; else it is that of the floor where the silhouette ends, or the body's
+    own."""
     blurred: bool = False
     """Whether the film is blurred by motion. A silhouette then has what a limb covers at any time of the exposure, which is too wide; what
     is covered since this frame only, and so for a part of the exposure, does not count, except in the status."""
@@ -111,11 +115,15 @@ class MonocularTracker:
             arms = self.arm_colours.seen(state.colours, codes, mask, last, observation.ignore)
             whole, observation = replace(whole, arms=arms), replace(observation, arms=arms)
         narrow = self.settings.turned and self.is_narrow(mask, last)
+        seen, stands = without(mask, state.unexplained), None
+        if self.free:
+            stands = standing_place(self.picture, seen, self.floor, self.upright(last))
+            observation = replace(observation, soles=soles_row(seen))
         for cycle in range(self.settings.cycles):
             others = estimate  # values of the DOF outside a stage; later stages see the torso's new estimate, but not a limb's
             for i, stage in enumerate(self.stages):
                 weigh = stage.weigh(observation, others, last)
-                select, propose = stage.selection(particles[i], weigh), stage.propose(cycle, narrow)
+                select, propose = stage.selection(particles[i], weigh), stage.propose(cycle, narrow, stands)
                 particles[i] = step(rng, particles[i], resample=select, propose=propose, weigh=weigh, number=stage.number)
                 estimate = stage.put(estimate, stage.estimate(particles[i]))
                 others = estimate if stage.moves_torso else others
@@ -132,6 +140,16 @@ class MonocularTracker:
         found = self.start(rng, mask, also)
         better = found.status != "absent" and self.misfit(found) < BETTER * misfit
         return found if better else state._replace(followed=0, least=misfit)
+
+    @property
+    def free(self) -> bool:
+        """Whether each frame's distance is estimated: a whole body's, unless a preset of the paper or `moves` says that it stays."""
+        return self.moves and self.settings.turned and PLACE[0] in self.picture.body.skeleton.dof_names
+
+    def upright(self, pose: Array) -> Array:
+        """The whole body's upright pose (D,) with the heading of a pose (D,)."""
+        turn = self.picture.body.skeleton.dof_names.index(HEADING)
+        return np.where(np.arange(len(pose)) == turn, pose, 0.0)
 
     def misfit(self, state: State) -> float:
         """Cost of a state's estimate with that of its posture and of feet below the floor, pixels."""
@@ -159,7 +177,9 @@ class MonocularTracker:
 
     def search(self, mask: Mask) -> pose_search.CoarsePose:
         """The best coarse pose in a mask (H, W); with `turned` of all directions and heights if the upright person fits badly."""
-        return (pose_search.search_turned if self.settings.turned else pose_search.search_pose)(self.picture, mask)
+        if not self.settings.turned:
+            return pose_search.search_pose(self.picture, mask)
+        return pose_search.search_turned(self.picture, mask, self.floor, moves=self.moves or self.floor is not None)
 
     def observe(self, mask: Mask, pose: Array, also: Cost | None = None, unexplained: Unexplained | None = None) -> Observation:
         """The observation of a mask (H, W) without what is left out beside `pose` (D,); with `ignore_legs` without the region where the
@@ -226,4 +246,4 @@ class MonocularTracker:
         """The filter's stages, in order; a whole body's legs that are not among them are added at the end."""
         named, limbs = self.settings.stages, limbs_of(self.picture.body.skeleton)
         legs = [limb for limb in limbs if limb.endswith("leg") and not any(limb in name for name in named)]
-        return tuple(make_stage(self.picture, self.settings, name, self.scheme, self.floor) for name in (*named, *legs))
+        return tuple(make_stage(self.picture, self.settings, name, self.scheme, self.floor, self.free) for name in (*named, *legs))

@@ -11,17 +11,17 @@ from shadowpuppet.body.models import make_body, whole_from_upper
 from shadowpuppet.body.sizes import BoneSizes, CardboxSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.camera.rasterize import Picture
-from shadowpuppet.geometry import Array, inverse, transform
+from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
+from shadowpuppet.tracking.monocular.standing_place import PLACE, raised_to, standing_place
 from shadowpuppet.tracking.monocular.whole_distance import whole_distance, whole_poses
 from shadowpuppet.tracking.silhouette_cost import Observation
 
-CUT_OFF_ROWS = 2
-"""A silhouette that reaches this many last rows of the picture is cut off there."""
-DISTANCE_FACTORS = np.arange(0.8, 1.5, 0.01)
-"""Distances that are tried, relative to that of the upper body."""
+FLOOR = 0.0
+"""Height of a calibration's floor in its world, metres."""
+AGREE = 0.25
+"""Greatest difference, as a logarithm, of the distances by the floor and by the upper body: else the world's zero is no floor."""
 WIDTH_FACTORS = np.arange(0.75, 1.61, 0.05)
 """Factors on widths that are tried."""
 WIDEST, REFITS = 3, 2
@@ -45,8 +45,8 @@ def _coarse_poses(camera: Camera, masks: Sequence[Mask], body: str, estimate: Pe
 def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEstimate, body: str, sizes: BoneSizes | None = None,
                         distance: float | None = None, standing: bool = True) -> PersonEstimate:
     """The whole-body estimate for an upper-body one, with the neck at the same place, from masks (H, W) of a person facing the camera. The
-    distance (m), if not given, comes from the soles of a person known to be `standing`, and else from whole poses (`whole_distance`): trunk
-    and arms alone determine it worse, as clothes can make them wide. Given sizes are kept."""
+    distance (m), if not given, comes from the floor, or from the stature of a person known to be `standing`, or else from whole poses
+    (`whole_distance`): trunk and arms alone determine it worse, as clothes can make them wide. Given sizes are kept."""
     found = upper.sizes
     assert isinstance(found, CardboxSizes)
     whole: BoneSizes = sizes or whole_from_upper(body, found, upper.height)
@@ -57,38 +57,44 @@ def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEsti
     def dressed(there: PersonEstimate, search: SearchPoses = _coarse_poses) -> PersonEstimate:
         return there if sizes is not None else _with_clothes(camera, masks, there, whole, body, search)
 
-    if distance is None and standing:
-        estimate = _over_soles(camera, masks, estimate, neck, body, whole)
-    elif distance is None:
-        factor = whole_distance(camera, masks, body, lambda factor: dressed(_at_distance(estimate, factor, neck)))
-        estimate = _at_distance(estimate, factor, neck)
+    if distance is None:
+        stands = _on_floor(camera, masks, estimate, body)
+        stands = _standing(camera, masks, estimate, body) if stands is None and standing else stands
+        if stands is None and not standing:
+            factor = whole_distance(camera, masks, body, lambda factor: dressed(_at_distance(estimate, factor, neck)))
+            stands = _at_distance(estimate, factor, neck)
+        estimate = stands or estimate
     estimate = dressed(estimate)
     for _ in range(0 if standing else REFITS):  # straight legs in place of bent ones would make them too thin
         estimate = dressed(estimate, whole_poses)
     return estimate
 
 
-def _over_soles(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, neck: float, body: str,
-                sizes: BoneSizes) -> PersonEstimate:
-    """The estimate at the distance at which a standing person's soles are where the masks (H, W) end, if any ends in the picture."""
-    soles = np.array([np.flatnonzero(mask.any(1))[-1] for mask in masks if not mask[-CUT_OFF_ROWS:].any()])
-    if not len(soles):
-        return estimate
-    candidates = [_at_distance(estimate, factor, neck) for factor in DISTANCE_FACTORS]
-    rows = np.array([_soles_row(each.picture(camera, body), sizes) for each in candidates])
-    return candidates[int(np.argmin(np.abs(rows - np.median(soles))))]
+def _on_floor(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str) -> PersonEstimate | None:
+    """The estimate upright on the calibration's floor, where the masks (H, W) end; None if that is not where the upper body is."""
+    found = _standing(camera, masks, estimate, body, FLOOR) if camera.oriented else None
+    if found is None or abs(np.log(found.distance / estimate.distance)) > AGREE:
+        return None
+    return replace(found, elevation=estimate.elevation + raised_to(estimate.picture(camera, body), FLOOR))
+
+
+def _standing(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str,
+              floor: float | None = None) -> PersonEstimate | None:
+    """The estimate at the median of the places at which a person who stands upright fits the masks (H, W); None if they show none. `floor`:
+    its height in the world, metres, if known."""
+    picture = estimate.picture(camera, body)
+    places = picture.body.skeleton.dof_indices(PLACE)
+    upright = np.zeros(len(picture.body.skeleton.dofs))
+    found = [pose[places] for mask in masks if (pose := standing_place(picture, mask, floor, upright)) is not None]
+    if not found:
+        return None
+    ahead, _, raised = np.median(found, axis=0).tolist()
+    return replace(estimate, distance=estimate.distance - ahead, elevation=estimate.elevation + raised)
 
 
 def _at_distance(estimate: PersonEstimate, factor: float, neck: float) -> PersonEstimate:
     """The estimate at `factor` times the distance, with the neck (`neck` metres above the pelvis) at the same place in the picture."""
     return replace(estimate, distance=factor * estimate.distance, elevation=factor * (estimate.elevation + neck) - neck)
-
-
-def _soles_row(picture: Picture, sizes: BoneSizes) -> float:
-    """The picture's row of the soles of the person standing upright."""
-    camera, standing = picture.camera, picture.body.skeleton.pose()[None]
-    soles = picture.points(standing, ["left_ankle", "right_ankle"])[0] - sizes.ankle_height * picture.T_camera_base[:3, 2]
-    return float(camera.project(transform(inverse(camera.T_camera_world), soles))[:, 1].mean())
 
 
 def _with_clothes(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, sizes: BoneSizes, body: str,

@@ -80,4 +80,4 @@ def _started(tracker: MonocularTracker, masks: Sequence[Mask]) -> list[State]:
 def _tracker(camera: Camera, body: str, estimate: PersonEstimate) -> MonocularTracker:
     settings = MonocularSettings(body=body, explore=PARTICLES)
     parts = {name: replace(getattr(settings, name), particles=PARTICLES) for name in ("torso", "arm")}
-    return MonocularTracker(estimate.picture(camera, body), replace(settings, **parts))
+    return MonocularTracker(estimate.picture(camera, body), replace(settings, **parts), moves=False)
