@@ -1,4 +1,4 @@
-"""People who sit, kneel, squat and lie, or walk in and sit down: made films tracked with defaults, for docs/accuracy.md.
+"""People who sit, kneel, squat and lie, or walk: made films tracked with defaults, for docs/accuracy.md.
 
     python benchmarks/postures.py [--films "desk;sits, 3 cameras"] [--folder FOLDER] [--against FILE] [--json FILE] [--markdown FILE]
 
@@ -105,12 +105,18 @@ def _ring(name: str, body: Mannequin, posture: Any, gestures: str, *, seed: int,
     return Film(name, spec)
 
 
+def _walk(seconds: float) -> tuple[Gesture, ...]:
+    """A walk along a line of two metres, there and back."""
+    return (Gesture(motion="walk", seconds=seconds, path="line", size=2.0),)
+
+
 def films() -> tuple[Film, ...]:
     """All films, some 3 to 6 s each."""
     man, woman, tall, small = _person("man", 81), _person("woman", 82), _person("man", 83), _person("woman", 84)
     child = _person("child", 85)
     desk = Viewpoint(height=0.7 * man.stature, distance=1.3, fov_deg=65)
     home = (Gesture(motion="sit_down", seconds=3.5), Gesture(motion="sit_down", seconds=3.5))
+    far = Viewpoint(height=1.4, distance=5.0, fov_deg=55)
     return (
         _one("stands", man, "standing", "reach 3, wave_hands 2", seed=81, view=Viewpoint(height=1.5, distance=2.3)),
         _one("a child stands", child, "standing", "reach 3, wave_hands 2", seed=85),
@@ -127,6 +133,8 @@ def films() -> tuple[Film, ...]:
              whole=True),
         _one("squats, whole", woman, "standing", "squat 4", seed=97, whole=True),
         _one("kneels, whole", small, "kneeling", "wave_hands 2.5, reach 2.5", seed=98, whole=True),
+        _one("walks across, whole", man, "standing", _walk(4.0), seed=99, turn=90, whole=True, view=far),
+        _one("walks there and back, whole", small, "standing", _walk(5.0), seed=100, whole=True, view=far),
         _ring("sits, 3 cameras", man, "seated", "reach 2.5", seed=101, cameras=3, chair="known"),
         _ring("sits, new chair, 3 cameras", tall, "seated", "reach 2.5", seed=102, cameras=3, chair="new"),
         _ring("sits down, 3 cameras", small, "standing", "sit_down 3", seed=104, cameras=3, chair="known"),

@@ -110,6 +110,13 @@ class RunWriter:
         if trouble is not None and (kind is None or issubclass(kind, ShadowPuppetError)):
             raise trouble  # a film that changes may be why it could not be read
 
+    def track_as(self, body_name: str, dof_names: Sequence[str], joint_names: Sequence[str], settings: Mapping[str, Any]) -> None:
+        """Write the motion of another body, which the film asks for, with the run's settings; before `begin`."""
+        if body_name == self.info["body"]:
+            return
+        self.info |= {"body": body_name, "settings": for_toml(plain(settings, "settings"))}
+        self._motion, self._intervals = MotionBuilder(body_name, dof_names, joint_names), IntervalWriter(joint_names)
+
     def check(self) -> None:
         """Raise `ShadowPuppetError` if the folder is not this run's any more, or if one of its inputs differs from what it was when the run
         began: in size or time of change."""

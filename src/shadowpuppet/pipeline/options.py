@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -79,7 +79,8 @@ class Options:
     """Distance from the camera to the middle of the body at the start, metres; one camera only. Overrides recording.toml."""
     body: BodyName | None = None
     """Body model in place of the tracker's own: an upper body (cardbox, cardbox_bends, boxes or rounded; one camera only) or a whole body
-    (anatomical or cylinders). By default rounded with one camera, anatomical with several, the paper's with the preset of a paper."""
+    (anatomical or cylinders). By default anatomical with several cameras, and with one where the feet are seen and the person walks or sits
+    down, unless sizes or reference pictures are given; else rounded; the paper's with the preset of a paper."""
     person: Path | None = None
     """Sizes of the person, saved by an earlier run or by `fit-person` (person.toml)."""
     prior: Path | None = None
@@ -148,6 +149,15 @@ class Options:
     def uses_keypoints(self) -> bool:
         """Whether keypoints are used where there are any."""
         return "keypoints" in self.evidence if self.evidence is not None else self.preset == "default"
+
+    def body_is_known(self, references: bool) -> bool:
+        """Whether one camera's body does not depend on the film: it is said, a paper's, or that of given sizes or of `references`."""
+        usual = MonocularSettings().body
+        return references or self.body is not None or self.preset != "default" or self.person is not None or self.tracker.body != usual
+
+    def with_body(self, body: BodyName) -> Options:
+        """The options with another body for one camera."""
+        return self if body == self.tracker.body else replace(self, body=body, tracker=replace(self.tracker, body=body))
 
     @property
     def smoothing(self) -> tuple[Method, float]:

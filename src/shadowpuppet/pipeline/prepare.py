@@ -10,7 +10,7 @@ from typing import Generic, NamedTuple
 
 import numpy as np
 
-from shadowpuppet.body.models import average_body
+from shadowpuppet.body.models import WHOLE, average_body
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.io.inputs.inputs import Resuming
 from shadowpuppet.io.person import read_person, write_person
@@ -21,7 +21,7 @@ from shadowpuppet.pipeline.findings.film import films_again
 from shadowpuppet.pipeline.findings.keypoints import look_at_keypoints
 from shadowpuppet.pipeline.findings.look import Look, RigLook, Survey
 from shadowpuppet.pipeline.findings.rig import survey_rig
-from shadowpuppet.pipeline.options import Options, check_used, plain_options
+from shadowpuppet.pipeline.options import Options, check_used, plain_options, read_options
 from shadowpuppet.pipeline.person import fit_monocular
 from shadowpuppet.pipeline.person_rig import fit_multiview
 from shadowpuppet.pipeline.progress import STAGES, Listener, generators
@@ -114,13 +114,34 @@ def check_options(options: Options, rig: Rig) -> None:
         read_prior(options.prior)
 
 
+def for_film(survey: Survey, options: Options) -> Options:
+    """The options with the body that one camera's film asks for, if nothing else determines it."""
+    look, rig = survey.look, survey.rig
+    if not isinstance(look, Look) or is_for_rig(rig, options) or options.body_is_known(bool(rig.recording.references)):
+        return options
+    return options.with_body(look.body)
+
+
+def as_before(folder: str | Path, options: Options) -> Options:
+    """The options with the body of a run in a folder that was broken off, where the film determined it."""
+    path = Path(folder) / "run.toml"
+    before = read_options(path).get("body") if path.exists() and not options.body_is_known(references=False) else None
+    return options.with_body(before) if before in WHOLE else options
+
+
 def run_writer(rig: Rig, kind: Kind[State, Observation, Before], folder: str | Path, options: Options, resume: bool) -> RunWriter:
     """The writer of a run's folder; `resume`: an earlier run there goes on."""
-    body, recording = average_body(getattr(options, kind.settings).body), rig.recording
+    recording = rig.recording
     info = {"recording": recording.path.resolve(), "method": kind.name(options.preset, len(rig.cameras)),
             "cameras": list(rig.names) if is_for_rig(rig, options) else None, "settings": plain_options(options),
             "truth": recording.truth and recording.truth.resolve(), "begin": recording.begin or None, "end": recording.duration}
-    return RunWriter(folder, body.name, body.skeleton.dof_names, joint_names(body), info, Resuming(resume, rig.inputs))
+    return RunWriter(folder, *body_names(kind, options), info, Resuming(resume, rig.inputs))
+
+
+def body_names(kind: Kind[State, Observation, Before], options: Options) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+    """The tracked body's name, and those of its DOF and joints."""
+    body = average_body(getattr(options, kind.settings).body)
+    return body.name, body.skeleton.dof_names, joint_names(body)
 
 
 def look_around(rig: Rig, options: Options, kind: Kind[State, Observation, Before], cache: SilhouetteCache | None = None,
@@ -133,7 +154,8 @@ def look_around(rig: Rig, options: Options, kind: Kind[State, Observation, Befor
 def prepare(rng: np.random.Generator, rig: Rig, options: Options, kind: Kind[State, Observation, Before],
             cache: SilhouetteCache | None = None, listener: Listener | None = None) -> Prepared[State, Observation, Before]:
     """Survey a recording, and fit the person unless tracking is hopeless. Raises a `ShadowPuppetError` if something cannot be used."""
-    return fit_survey(rng, look_around(rig, options, kind, cache, listener), options, kind, cache, listener or Listener())
+    survey = look_around(rig, options, kind, cache, listener)
+    return fit_survey(rng, survey, for_film(survey, options), kind, cache, listener or Listener())
 
 
 def fit_survey(rng: np.random.Generator, survey: Survey, options: Options, kind: Kind[State, Observation, Before],

@@ -15,15 +15,18 @@ from shadowpuppet.io.run import read_run
 from shadowpuppet.io.run_writer import OWN_KEYS, RunWriter, write_metrics
 from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.frame_process import Task, frames_beside
-from shadowpuppet.pipeline.options import Options
+from shadowpuppet.pipeline.options import Options, plain_options
 from shadowpuppet.pipeline.people.run import PeopleRun, check_people
 from shadowpuppet.pipeline.prepare import (
     MONOCULAR,
     MULTIVIEW,
     Kind,
     Prepared,
+    as_before,
+    body_names,
     check_options,
     fit_survey,
+    for_film,
     is_for_rig,
     look_around,
     run_writer,
@@ -68,9 +71,12 @@ def run(rig: Rig, kind: Kind[State, Observation, Before], folder: str | Path, op
     """Survey, fit, track, smooth, show and judge; see `track_recording`."""
     for_look, for_track = generators(options)
     check_options(options, rig)
+    options = as_before(folder, options) if resume else options
     with run_writer(rig, kind, folder, options, resume) as writer:
         start = time.perf_counter()
         survey = look_around(rig, options, kind, cache, listener)
+        options = for_film(survey, options)
+        writer.track_as(*body_names(kind, options), plain_options(options))
         if survey.several and (survey.look.refusal is None or options.anyway):
             return _run_people(writer, survey.settled(), options, listener, (for_look, for_track))
         prepared = fit_survey(for_look, survey, options, kind, cache, listener)

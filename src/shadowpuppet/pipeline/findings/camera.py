@@ -12,6 +12,7 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import WHOLE
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.errors import HARMFUL, NOTED, Finding
+from shadowpuppet.pipeline.findings.body import body_for, whole_person
 from shadowpuppet.pipeline.findings.cautions import (
     added_cautions,
     condition_cautions,
@@ -78,8 +79,11 @@ def _look(footage: Footage, film: FilmSurvey, options: Options) -> Look:
     )  # fmt: skip
     if look.refusal:
         return look
-    posture = (feet_cautions({camera.name: look.quality.border["bottom"]}) if options.tracker.body in WHOLE
-               else sitting_cautions(film.masks, [frame.time for frame in sample.frames]))
+    sits = sitting_cautions(film.masks, [frame.time for frame in sample.frames])
+    look = replace(look, body=body_for(film.masks, bool(sits)))
+    whole = options.tracker.body if options.body_is_known(bool(footage.recording.references)) else look.body
+    posture = feet_cautions({camera.name: look.quality.border["bottom"]}) if whole in WHOLE else sits
+    posture += [whole_person()] if whole != options.tracker.body else []
     several = _several_people(film, HARMFUL if options.people is None else NOTED)
     doubts = (*several, *posture, *_doubts(look, footage), *film_cautions(footage),
               *recovery_cautions([camera.name], [film.silhouettes]), *added_cautions(look.added))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
+from shadowpuppet.body.models import BodyName
 from shadowpuppet.calibration.agreement import Agreement
 from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask, Seen
@@ -106,6 +107,8 @@ class Look(RecordingLook, FilmLook):
     """The same with the plain rule of eq. 1; None if the background has no standard deviation."""
     exact_overlap_plain: float | None
     """As `exact_overlap`, with the plain rule of eq. 1."""
+    body: BodyName = "rounded"
+    """The body that the film asks for."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -40,7 +40,7 @@ def make_stage(picture: Picture, settings: MonocularSettings, name: str, scheme:
     """The paper's stage, or the extended one if the settings use any extension. `floor`: its height in the world,
     metres, if it is known. Other arguments and errors: as for `FilterStage`."""
     extended = settings.explore or settings.motion_weight or settings.posture_weight or settings.estimate != "best"
-    return ExtendedStage(picture, settings, name, scheme, floor, moves) if extended else FilterStage(picture, settings, name, scheme)
+    return ExtendedStage(picture, settings, name, scheme, floor, moves) if extended else FilterStage(picture, settings, name, scheme, moves)
 
 
 class ExtendedStage(FilterStage):
