@@ -228,7 +228,8 @@ def _doubts(fit: SizeFit, source: str, start: float, moments: int) -> list[Findi
                                  "turned, or hidden in part, they may be a quarter nearer or farther; measure the distance and give "
                                  "--distance",
                                  "distance uncertain: measure it, give --distance", HARMFUL, overlap=fit.place_overlap))
-    apart = 0 if source == "references" else moments - len(fit.overlaps)
+    stays = isinstance(fit.guess.sizes, CardboxSizes)  # a whole person may go elsewhere
+    apart = 0 if source == "references" or not stays else moments - len(fit.overlaps)
     if apart >= ELSEWHERE * moments:
         doubts.append(Finding.of("in {apart} of {moments} moments of the film the person is at another distance or height than in most: "
                                  "they walk, or sit down; an upper body stays where it was measured, a whole one can sit down (--body "

@@ -138,7 +138,7 @@ def run_writer(rig: Rig, kind: Kind[State, Observation, Before], folder: str | P
     return RunWriter(folder, *body_names(kind, options), info, Resuming(resume, rig.inputs))
 
 
-def body_names(kind: Kind[State, Observation, Before], options: Options) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+def body_names(kind: Kind[State, Observation, Before], options: Options) -> tuple[str, tuple[str, ...], list[str]]:
     """The tracked body's name, and those of its DOF and joints."""
     body = average_body(getattr(options, kind.settings).body)
     return body.name, body.skeleton.dof_names, joint_names(body)

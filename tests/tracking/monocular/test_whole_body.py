@@ -113,7 +113,7 @@ def test_thighs_of_who_squats_are_as_wide_as_in_whole_poses():
     there = PersonEstimate(upper, HEIGHT, 2.5, float(up + neck) - upper.torso_height)
     found, coarse = (whole_from_estimate(view.camera, masks, there, "anatomical", distance=2.5, standing=standing).sizes.thigh_width
                      for standing in (False, True))  # fmt: skip
-    assert abs(found / average.thigh_width - 1.2) < 0.08
+    assert abs(found / average.thigh_width - 1.2) < 0.11  # two of the factors that are tried
     assert coarse < 0.97 * found
 
 

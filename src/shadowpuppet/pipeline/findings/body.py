@@ -13,14 +13,13 @@ from shadowpuppet.body.models import BodyName
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import NOTED, Finding
 from shadowpuppet.geometry import Array
+from shadowpuppet.pipeline.findings.cautions import MOSTLY
 from shadowpuppet.tracking.monocular.standing_place import soles_row
 
 LOW = 0.05
 """Share of the silhouette's height, from below, that shows whether feet are seen."""
 FEET = 0.5
 """Greatest width of that part, over the root of the silhouette's area: that of feet is 0.1 to 0.4, of a cut off trunk 0.6 to 0.8."""
-MOSTLY = 0.5
-"""Least share of the masks that show feet."""
 WALKS = 0.2
 """Least way of the feet in the picture, over the silhouette's height, between the tenth and the ninetieth per cent of the masks."""
 
@@ -28,7 +27,7 @@ WALKS = 0.2
 def body_for(masks: Sequence[Mask], sits: bool) -> BodyName:
     """The body for a film with masks (H, W) of moments that are spread over it; `sits`: whether the person sits down or kneels in it."""
     feet = [found for mask in masks if (found := _feet(mask)) is not None]
-    if len(feet) < MOSTLY * max(sum(mask.any() for mask in masks), 1):
+    if len(feet) < (1 - MOSTLY) * max(sum(mask.any() for mask in masks), 1):
         return "rounded"
     x, y, height = np.array(feet).T
     way = max(float(np.diff(np.percentile(each, [10, 90]))[0]) for each in (x, y))

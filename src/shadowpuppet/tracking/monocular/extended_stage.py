@@ -26,8 +26,6 @@ TURNED_SHARE = 0.5
 """Share of the torso's explored candidates that are turned anywhere, in a silhouette too narrow for the trunk as it was."""
 MEAN_TEMPERATURE = 50.0
 """For the mean estimate: a particle's weight falls to 1/e for this much more cost (pixels at 320 x 240)."""
-SOLES_ERROR = 1.0
-"""Standard deviation of the silhouette's last row (pixels at 320 x 240)."""
 WIDE = 5.0
 """Standard deviation of the places of explored candidates, over the noise of a frame."""
 MOVED_SHARE = 2 / 3
@@ -98,7 +96,7 @@ class ExtendedStage(FilterStage):
         costs: list[Cost] = [lambda poses: posture * posture_penalty(self.picture.body.skeleton, poses)] if posture else []
         costs += [] if self.floor is None else standing_costs(self.picture, self.floor)
         if observation.soles is not None and self.moves_feet:
-            costs += [soles_cost(self.picture, observation.soles, MEAN_TEMPERATURE / (2 * SOLES_ERROR**2))]
+            costs += [soles_cost(self.picture, observation.soles, MEAN_TEMPERATURE / 2)]  # the row errs by a pixel
         costs += [self._motion_cost(motion, last)] if motion else []
         return costs + super().extra_costs(observation, last)
 

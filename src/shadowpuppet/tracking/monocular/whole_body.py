@@ -18,8 +18,6 @@ from shadowpuppet.tracking.monocular.standing_place import PLACE, raised_to, sta
 from shadowpuppet.tracking.monocular.whole_distance import whole_distance, whole_poses
 from shadowpuppet.tracking.silhouette_cost import Observation
 
-FLOOR = 0.0
-"""Height of a calibration's floor in its world, metres."""
 AGREE = 0.25
 """Greatest difference, as a logarithm, of the distances by the floor and by the upper body: else the world's zero is no floor."""
 WIDTH_FACTORS = np.arange(0.75, 1.61, 0.05)
@@ -72,10 +70,11 @@ def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEsti
 
 def _on_floor(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str) -> PersonEstimate | None:
     """The estimate upright on the calibration's floor, where the masks (H, W) end; None if that is not where the upper body is."""
-    found = _standing(camera, masks, estimate, body, FLOOR) if camera.oriented else None
+    level = 0.0  # in a calibration's world
+    found = _standing(camera, masks, estimate, body, level) if camera.oriented else None
     if found is None or abs(np.log(found.distance / estimate.distance)) > AGREE:
         return None
-    return replace(found, elevation=estimate.elevation + raised_to(estimate.picture(camera, body), FLOOR))
+    return replace(found, elevation=estimate.elevation + raised_to(estimate.picture(camera, body), level))
 
 
 def _standing(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str,
