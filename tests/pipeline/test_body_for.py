@@ -10,7 +10,8 @@ import pytest
 from shadowpuppet.io.run import read_run
 from shadowpuppet.pipeline.findings.body import WALKS, body_for
 from shadowpuppet.pipeline.options import Options, make_options
-from shadowpuppet.pipeline.prepare import as_before
+from shadowpuppet.pipeline.prepare import as_before, for_person, look_at
+from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.synthetic import Gesture, Mannequin, Scene, Spec, Viewpoint, synthesize
 
@@ -79,6 +80,12 @@ def test_a_run_tracks_the_whole_person_who_walks_and_goes_on_so(walk, tmp_path):
     assert as_before(tmp_path / "run", make_options(quick)).body == "anatomical"
     assert as_before(tmp_path / "elsewhere", make_options(quick)).body is None
 
+    known = make_options(quick | {"person": str(tmp_path / "run" / "person.toml")})  # of the whole body, which nobody needs to say
+    assert for_person(open_rig(walk, known), known).body == "anatomical"
+    assert look_at(walk, known).person["source"] == str(known.person)
+
     upper = track_recording(walk, tmp_path / "upper", make_options(quick | {"body": "rounded"}))
     assert upper.motion.body_name == "rounded"
     assert not any("the whole person" in finding.short for finding in upper.look.findings)
+    of_upper = make_options(quick | {"person": str(tmp_path / "upper" / "person.toml")})
+    assert for_person(open_rig(walk, of_upper), of_upper) == of_upper

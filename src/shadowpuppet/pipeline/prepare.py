@@ -10,7 +10,8 @@ from typing import Generic, NamedTuple
 
 import numpy as np
 
-from shadowpuppet.body.models import WHOLE, average_body
+from shadowpuppet.body.models import WHOLE, average_body, kind_of
+from shadowpuppet.body.sizes import CardboxSizes
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.io.inputs.inputs import Resuming
 from shadowpuppet.io.person import read_person, write_person
@@ -83,6 +84,7 @@ def look_at(recording: str | Path, options: Options | None = None, listener: Lis
     several. Raises a `ShadowPuppetError` if something cannot be used."""
     options = options or Options()
     rig = open_rig(recording, options)
+    options = for_person(rig, options)
     look = (survey_rig(rig, options, listener=listener).look if is_for_rig(rig, options)
             else prepare(generators(options)[0], rig, options, MONOCULAR, listener=listener).look)
     return look if look.keypoints is not None else replace(look, keypoints=look_at_keypoints(rig.footage))
@@ -94,6 +96,7 @@ def fit_person(recording: str | Path, file: str | Path, options: Options | None 
     """Measure the person and save the sizes. Raises a `ShadowPuppetError` if no person is found or the file cannot be written."""
     options = options or Options()
     rig, (rng, _) = open_rig(recording, options), generators(options)
+    options = for_person(rig, options)
     if is_for_rig(rig, options):
         prepared = prepare(rng, rig, options, MULTIVIEW, listener=listener)
     else:
@@ -112,6 +115,14 @@ def check_options(options: Options, rig: Rig) -> None:
         read_person(options.person, (options.multiview if several else options.tracker).body)
     if options.prior is not None and several:
         read_prior(options.prior)
+
+
+def for_person(rig: Rig, options: Options) -> Options:
+    """The options with one camera's body of given sizes, if nothing says another. Raises `FormatError` for a person that cannot be read."""
+    if options.person is None or is_for_rig(rig, options) or replace(options, person=None).body_is_known(references=False):
+        return options
+    sizes = read_person(options.person).sizes
+    return options if isinstance(sizes, CardboxSizes) else options.with_body(kind_of(sizes))
 
 
 def for_film(survey: Survey, options: Options) -> Options:

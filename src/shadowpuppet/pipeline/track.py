@@ -27,6 +27,7 @@ from shadowpuppet.pipeline.prepare import (
     check_options,
     fit_survey,
     for_film,
+    for_person,
     is_for_rig,
     look_around,
     run_writer,
@@ -70,6 +71,7 @@ def run(rig: Rig, kind: Kind[State, Observation, Before], folder: str | Path, op
         cache: SilhouetteCache | None = None, resume: bool = False) -> Summary:
     """Survey, fit, track, smooth, show and judge; see `track_recording`."""
     for_look, for_track = generators(options)
+    options = for_person(rig, options)
     check_options(options, rig)
     options = as_before(folder, options) if resume else options
     with run_writer(rig, kind, folder, options, resume) as writer:

@@ -88,8 +88,8 @@ def soles_cost(picture: Picture, row: float, weight: float) -> Cost:
 
 def contact_cost(picture: Picture, level: float, weight: float) -> Cost:
     """The cost (N,) of poses (N, D) none of whose feet stands on a floor at a height `level` (m) in the world; `weight`: per m^2. A foot
-    stands on heel and toes; who kneels is on knee and toes. It grows in proportion far
-    away: a person may jump, or sit with hanging feet."""
+    stands on heel and toes; who kneels is on knee and toes. Far away it grows in proportion: a person may jump, or sit with hanging
+    feet."""
     known, sides = picture.body.landmark_names, ("left", "right")
     feet = [[f"{side}_{name}" for name in names] for side in sides for names in (("heel", "toe"), ("knee", "toe"))]
     if any(name not in known for names in feet for name in names):
