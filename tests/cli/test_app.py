@@ -393,7 +393,10 @@ def test_a_whole_body_is_tracked_with_one_camera_and_its_sizes_are_kept(shell, r
     assert 'body = "cylinders"' in person.read_text()
     assert shell("track", recording, "-o", "again", "--body", "cylinders", "--person", person, "--quiet", *QUICK)[0] == 0
     assert (tmp_path / "again" / "person.toml").read_text().split("[sizes]")[1] == person.read_text().split("[sizes]")[1]
-    assert "sizes: found those of the body 'cylinders', expected those of 'rou" in refused(shell, "track", recording, "--person", person)
+    assert shell("track", recording, "-o", "known", "--person", person, "--quiet", *QUICK)[0] == 0
+    assert read_run(tmp_path / "known").info["body"] == "cylinders"  # that of the sizes
+    said = "sizes: found those of the body 'cylinders', expected those of 'boxes'"
+    assert said in refused(shell, "track", recording, "--body", "boxes", "--person", person)
     assert 'Invalid value "ball" for --body. Choose from: "cardbox"' in refused(shell, "track", recording, "--body", "ball")
 
 

@@ -13,9 +13,9 @@ from shadowpuppet.pipeline.person import DOUBTFUL, ELSEWHERE, NOBODY, POOR, _dou
 from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
 
 
-def doubts(overlaps=None, place=0.9, source="proportions", start=0.9, moments=4):
+def doubts(overlaps=None, place=0.9, source="proportions", start=0.9, moments=4, stays=True):
     fit = SimpleNamespace(overlaps={f"m{n}": 0.9 for n in range(4)} if overlaps is None else overlaps, place_overlap=place)
-    return [(doubt.short.split(":")[0], doubt.severity) for doubt in _doubts(fit, source, start, moments)]
+    return [(doubt.short.split(":")[0], doubt.severity) for doubt in _doubts(fit, source, start, moments, stays)]
 
 
 @pytest.mark.parametrize("name", DOUBTFUL)
@@ -39,6 +39,7 @@ def test_somebody_who_changes_place_or_is_not_there():
     assert ELSEWHERE == 0.25
     assert doubts(moments=5) == []  # one of five
     assert doubts({"a": 0.9, "b": 0.9, "c": 0.9}, moments=4, start=0.1) == [("person changes place", HARMFUL)]
+    assert doubts({"a": 0.9, "b": 0.9, "c": 0.9}, moments=4, stays=False) == []  # a whole person may go elsewhere
     assert doubts({"front_t_pose": 0.9}, moments=4, source="references") == []
 
 

@@ -213,12 +213,13 @@ def fit_monocular(rng: np.random.Generator, survey: Survey, options: Options) ->
                "elevation": float(guess.elevation), "overlaps": dict(fit.overlaps), "start_overlap": start,
                "sizes": dict(zip(guess.sizes.names(), guess.sizes.to_array().tolist()))}
     beside = subject.beside_in(_few(masks)) if options.tracker.patience else None
-    return replace(subject, summary=summary, doubts=tuple(_doubts(fit, source, start, len(moments))), beside=(beside,))
+    doubts = _doubts(fit, source, start, len(moments), stays=subject.body.hem is not None)
+    return replace(subject, summary=summary, doubts=tuple(doubts), beside=(beside,))
 
 
-def _doubts(fit: SizeFit, source: str, start: float, moments: int) -> list[Finding]:
+def _doubts(fit: SizeFit, source: str, start: float, moments: int, stays: bool = True) -> list[Finding]:
     """Doubts about a fit, a sentence each; `start`: overlap of the body, in the best pose found, with the film's first silhouette;
-    `moments`: number of silhouettes that the person was looked for in."""
+    `moments`: number of silhouettes that the person was looked for in; `stays`: whether the body is an upper one, which stays there."""
     doubts = [Finding.of("references: {name}: the fitted body overlaps its silhouette by {overlap:.2f} only: is it the posture {name}, and "
                          "is the silhouette whole? take it again, or remove it", "reference {name} does not fit: take it again", NOTED,
                          name=name, overlap=overlap)
@@ -228,8 +229,7 @@ def _doubts(fit: SizeFit, source: str, start: float, moments: int) -> list[Findi
                                  "turned, or hidden in part, they may be a quarter nearer or farther; measure the distance and give "
                                  "--distance",
                                  "distance uncertain: measure it, give --distance", HARMFUL, overlap=fit.place_overlap))
-    stays = isinstance(fit.guess.sizes, CardboxSizes)  # a whole person may go elsewhere
-    apart = 0 if source == "references" or not stays else moments - len(fit.overlaps)
+    apart = moments - len(fit.overlaps) if stays and source != "references" else 0
     if apart >= ELSEWHERE * moments:
         doubts.append(Finding.of("in {apart} of {moments} moments of the film the person is at another distance or height than in most: "
                                  "they walk, or sit down; an upper body stays where it was measured, a whole one can sit down (--body "
