@@ -11,7 +11,6 @@ from functools import cache
 import numpy as np
 
 from shadowpuppet.body.segments import dofs_of, leg_postures, limbs_of
-from shadowpuppet.body.shapes import Hulls
 from shadowpuppet.body.skeleton import Skeleton, bounded
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
@@ -73,14 +72,14 @@ def floor_below(picture: Picture) -> float | None:
 
 
 def soles_cost(picture: Picture, row: float, weight: float) -> Cost:
-    """The cost (N,) of poses (N, D) whose lowest point is not in a row of the picture, where the silhouette ends; `weight`: per squared
+    """The cost (N,) of poses (N, D) whose lower sole is not in a row of the picture, where the silhouette ends; `weight`: per squared
     pixel at 320 x 240. It is bounded: shoes may be like the floor. The silhouette's sides say less of the distance: clothes make a person
     wider by an unknown share."""
-    camera, unit, names = picture.camera, pixel_scale(picture.camera.size), _lowest(picture)
-    under = np.array([[0.0, 0.0, _knee(picture) if name.endswith("knee") else 0.0] for name in names])
+    camera, unit = picture.camera, pixel_scale(picture.camera.size)
+    names = [f"{side}_{name}" for side in ("left", "right") for name in ("heel", "toe")]
 
     def cost(poses: Array) -> Array:
-        squared = (camera.project(picture.points_world(poses, names) - under)[..., 1].max(1) - row) ** 2 / unit
+        squared = (camera.project(picture.points_world(poses, names))[..., 1].max(1) - row) ** 2 / unit
         return weight * unit * np.where(np.isfinite(squared), squared / (1 + squared / SOLES_REACH**2), SOLES_REACH**2)
 
     return cost
@@ -94,11 +93,9 @@ def contact_cost(picture: Picture, level: float, weight: float) -> Cost:
     feet = [[f"{side}_{name}" for name in names] for side in sides for names in (("heel", "toe"), ("knee", "toe"))]
     if any(name not in known for names in feet for name in names):
         feet = [[name] for name in _lowest(picture)]
-    heights = [level + np.array([_knee(picture) if name.endswith("knee") else 0.0 for name in names]) for names in feet]
 
     def cost(poses: Array) -> Array:
-        off = [picture.points_world(poses, names)[..., 2] - height for names, height in zip(feet, heights)]
-        squared = np.min([(each**2).mean(1) for each in off], axis=0)
+        squared = np.min([((picture.points_world(poses, names)[..., 2] - level) ** 2).mean(1) for names in feet], axis=0)
         return weight * 2 * REACH**2 * (np.sqrt(1 + squared / REACH**2) - 1)
 
     return cost
@@ -120,11 +117,3 @@ def _lowest(picture: Picture) -> list[str]:
     """Names of the landmarks that may be on the floor."""
     known = picture.body.landmark_names
     return [f"{side}_{name}" for side in ("left", "right") for name in ("heel", "toe", "ankle", "knee") if f"{side}_{name}" in known]
-
-
-def _knee(picture: Picture) -> float:
-    """How far (m) the front of a knee, on which a person kneels, is from its joint."""
-    shapes, knee = picture.body.shapes, picture.body.skeleton.joint_index("left_knee")
-    assert isinstance(shapes, Hulls)
-    fixed = shapes.joints == knee
-    return float((shapes.centres[fixed] + shapes.radii[fixed])[:, 0].max())
