@@ -115,9 +115,8 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
     def beside_in(self, masks: Sequence[Mask]) -> BesideBody | None:
         """What the body leaves unexplained in most of some masks (H, W), in the poses that fit each best; None if nothing is."""
         unexplained, looks = None, max(1, round(MOST * len(masks)))
-        pose = None
+        pose, whole = None, self.body.hem is None  # coarse legs of a whole body may leave the feet out
         for k, mask in enumerate(masks):
-            whole = self.body.hem is None  # whose coarse legs may leave the feet out
             pose = self.tracker.start(np.random.default_rng(k), mask).pose if whole else self.tracker.search(mask).pose
             legs = self.picture.legs(pose) if self.tracker.settings.ignore_legs else None
             unexplained = look_beside(unexplained, mask, self.picture.mask(pose), looks, legs)

@@ -35,7 +35,7 @@ def body_for(masks: Sequence[Mask], sits: bool) -> BodyName:
 
 
 def whole_person() -> Finding:
-    """That the whole person is tracked, where nobody said so."""
+    """The finding that the whole person is tracked because of the film: no option gave the body."""
     return Finding("the person walks, or sits down, and the feet are seen: the whole person is tracked (--body anatomical), with more "
                    "doubt about the arms than an upper body (--body rounded), which stays where it was measured",
                    "the whole person is tracked: they walk, or sit down", NOTED)
@@ -46,9 +46,9 @@ def _feet(mask: Mask) -> Array | None:
     row = soles_row(mask)
     if row is None:
         return None
-    rows = np.flatnonzero(mask.any(1))
-    height = int(rows[-1] - rows[0]) + 1
-    low = mask[rows[-1] + 1 - max(round(LOW * height), 1) : rows[-1] + 1]
+    top, end = int(mask.any(1).argmax()), int(row + 0.5)
+    height = end - top
+    low = mask[end - max(round(LOW * height), 1) : end]
     if np.count_nonzero(low) > FEET * len(low) * np.count_nonzero(mask) ** 0.5:
         return None
     return np.array([np.median(np.nonzero(low)[1]), row, height], float)
