@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import postures
+import whole_people
 from cases import Case
 from keypoints import with_keypoints
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from postures import HERE as POSTURES
 from proving_ground import HERE as GROUND
 from proving_ground import made as made_ground
 from spoiled import SPOILS
+from whole_people import HERE as WHOLE
 
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.camera.mask import Mask, Seen
@@ -164,14 +166,14 @@ FIRST_FITS, FITS, FIT_STEP, FIT_DAMPING = 60, 8, 1e-4, 1e-4
 """Steps of the first frame and of every other, step of the derivatives (rad or m), and damping (m^2)."""
 
 
-def track_monocular(path: Path) -> Iterator[Tracked]:
-    """A recording of one camera with every fault."""
-    case, options = Case.read(path), make_options({})
+def track_monocular(path: Path, kind: str = "monocular") -> Iterator[Tracked]:
+    """A recording of one camera with every fault; `monocular_whole`: tracked as a whole body."""
+    case, options = Case.read(path), make_options({"body": "anatomical"} if kind == "monocular_whole" else {})
     picture = case.person(options, np.random.default_rng(0)).picture(case.camera, options.tracker.body)
     skeleton, names, rate = picture.body.skeleton, picture.body.landmark_names, 1 / float(np.median(np.diff(case.times)))
     turn, truth = case.camera.T_camera_world[:3, :3], _places(case.truth, names)
     right = true_poses(skeleton, picture.points_world, truth)
-    model, angles = variance_model("monocular"), np.array([dof.kind == "rotation" for dof in skeleton.dofs])
+    model, angles = variance_model(kind), np.array([dof.kind == "rotation" for dof in skeleton.dofs])
     for n, (fault, spoil) in enumerate(FAULTS.items()):
         masks, rng = spoil(np.random.default_rng(n), case.masks, rate), np.random.default_rng(1)
         codes = [None] * len(masks) if fault in OTHER_MOMENTS else case.codes
@@ -286,6 +288,8 @@ def collect(kind: str, path: Path, build: Path, again: bool, clean: bool = False
     folder = build / kind / path.name
     if path.parent == RINGS:
         make_ring(path)
+    elif path.parent == WHOLE:
+        whole_people.made(next(film for film in whole_people.films() if film.spec.name == path.name), WHOLE)
     elif path.parent == POSTURES:
         postures.made(next(film for film in _whole() if film.spec.name == path.name), POSTURES)
     if again or not (folder / "done").exists():
@@ -308,8 +312,10 @@ def _whole() -> list[postures.Film]:
     return [film for film in postures.films() if film.body is not None]
 
 
-TRACK = {"monocular": track_monocular, "multiview": track_multiview, **{kind: partial(track_multiview, kind=kind) for kind in SIGHTINGS}}
-MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND), **dict.fromkeys(("multiview", *SIGHTINGS), _rings),
+TRACK = {"monocular": track_monocular, "monocular_whole": partial(track_monocular, kind="monocular_whole"), "multiview": track_multiview, **{kind: partial(track_multiview, kind=kind) for kind in SIGHTINGS}}
+MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND),
+                                             "monocular_whole": lambda: [WHOLE / film.spec.name for film in whole_people.films()],
+                                             **dict.fromkeys(("multiview", *SIGHTINGS), _rings),
                                              "keypoints_one": lambda: [*_rings(), *(POSTURES / film.spec.name for film in _whole())]}
 
 

@@ -35,6 +35,8 @@ class Picture:
     camera: Camera
     T_camera_base: Array
     """The body's frame in the camera's, of shape (4, 4), metres."""
+    floor: float | None = None
+    """Height of the floor in the body's frame, metres; None if it is not known."""
 
     @cached_property
     def _lens(self) -> Lens:
@@ -164,11 +166,12 @@ class Picture:
         return defaultdict(list)
 
 
-def place(camera: Camera, distance: float, elevation: float) -> Array:
+def place(camera: Camera, distance: float, elevation: float, up: Array | None = None) -> Array:
     """T_camera_base (4, 4): the frame of Liu 2011's model, X toward the camera, Y to the image's right, Z up. Its origin, the middle of
-    the torso's lower edge at torso_y = 0, is `distance` metres from the camera along -X and `elevation` metres above it. Z is the
-    world's up if the camera is oriented, else the camera's own, as in the paper."""
-    up = camera.T_camera_world[:3, 2] if camera.oriented else np.array([0.0, -1.0, 0.0])
+    the torso's lower edge at torso_y = 0, is `distance` metres from the camera along -X and `elevation` metres above it. Z is `up` (3,)
+    in the camera's frame, by default the world's if the camera is oriented, else the camera's own, as in the paper."""
+    if up is None:
+        up = camera.T_camera_world[:3, 2] if camera.oriented else np.array([0.0, -1.0, 0.0])
     if abs(up[2]) > 0.9:  # the camera looks straight down or up: its own frame
         up = np.array([0.0, -1.0, 0.0])
     x = np.array([0.0, 0.0, -1.0]) + up * up[2]

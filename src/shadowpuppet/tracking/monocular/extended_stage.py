@@ -35,8 +35,8 @@ farther."""
 
 def make_stage(picture: Picture, settings: MonocularSettings, name: str, scheme: Scheme | None = None, floor: float | None = None,
                moves: bool = True) -> FilterStage:
-    """The paper's stage, or the extended one if the settings use any extension. `floor`: its height in the world,
-    metres, if it is known. Other arguments and errors: as for `FilterStage`."""
+    """The paper's stage, or the extended one if the settings use any extension. `floor`: its height in the
+    body's frame, metres, if it is known. Other arguments and errors: as for `FilterStage`."""
     extended = settings.explore or settings.motion_weight or settings.posture_weight or settings.estimate != "best"
     return ExtendedStage(picture, settings, name, scheme, floor, moves) if extended else FilterStage(picture, settings, name, scheme, moves)
 

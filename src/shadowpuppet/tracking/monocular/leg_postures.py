@@ -62,13 +62,13 @@ def _usual(skeleton: Skeleton, leg: str) -> tuple[Array, Array]:
 
 
 def floor_below(picture: Picture) -> float | None:
-    """Height (m) of the floor in the world, which is 0 in the calibration's; None if the camera's place is not known, or this cannot be the
-    floor on which the person is whose hips are at the body's place."""
-    skeleton = picture.body.skeleton
-    if not picture.camera.oriented or not any(limb.endswith("leg") for limb in limbs_of(skeleton)):
+    """Height (m) of the floor in the body's frame; None if it is not known, or cannot be the floor on which the person is whose hips are at
+    the body's place."""
+    skeleton, floor = picture.body.skeleton, picture.floor
+    if floor is None or not any(limb.endswith("leg") for limb in limbs_of(skeleton)):
         return None
-    hips, ankles = picture.points_world(skeleton.pose()[None], ["left_hip", "left_ankle"])[0, :, 2]
-    return 0.0 if ankles - BELOW_FEET <= 0 <= hips - ABOVE_FLOOR else None
+    hips, ankles = picture.body.points(skeleton.pose()[None], names=["left_hip", "left_ankle"])[0, :, 2]
+    return floor if ankles - BELOW_FEET <= floor <= hips - ABOVE_FLOOR else None
 
 
 def soles_cost(picture: Picture, row: float, weight: float) -> Cost:
@@ -86,8 +86,8 @@ def soles_cost(picture: Picture, row: float, weight: float) -> Cost:
 
 
 def contact_cost(picture: Picture, level: float, weight: float) -> Cost:
-    """The cost (N,) of poses (N, D) none of whose feet stands on a floor at a height `level` (m) in the world; `weight`: per m^2. A foot
-    stands on heel and toes; who kneels is on knee and toes. Far away it grows in proportion: a person may jump, or sit with hanging
+    """The cost (N,) of poses (N, D) none of whose feet stands on a floor at a height `level` (m) in the body's frame; `weight`: per m^2. A
+    foot stands on heel and toes; who kneels is on knee and toes. Far away it grows in proportion: a person may jump, or sit with hanging
     feet."""
     known, sides = picture.body.landmark_names, ("left", "right")
     feet = [[f"{side}_{name}" for name in names] for side in sides for names in (("heel", "toe"), ("knee", "toe"))]
@@ -95,22 +95,23 @@ def contact_cost(picture: Picture, level: float, weight: float) -> Cost:
         feet = [[name] for name in _lowest(picture)]
 
     def cost(poses: Array) -> Array:
-        squared = np.min([((picture.points_world(poses, names)[..., 2] - level) ** 2).mean(1) for names in feet], axis=0)
+        squared = np.min([((picture.body.points(poses, names=names)[..., 2] - level) ** 2).mean(1) for names in feet], axis=0)
         return weight * 2 * REACH**2 * (np.sqrt(1 + squared / REACH**2) - 1)
 
     return cost
 
 
 def standing_costs(picture: Picture, level: float) -> list[Cost]:
-    """What speaks against poses on a floor at a height `level` (m) in the world: feet below it, and feet off it."""
+    """What speaks against poses on a floor at a height `level` (m) in the body's frame: feet below it, and feet off it."""
     scale = pixel_scale(picture.camera.size)
     return [floor_cost(picture, level, FLOOR_WEIGHT * scale), contact_cost(picture, level, CONTACT_WEIGHT * scale)]
 
 
 def floor_cost(picture: Picture, level: float, weight: float) -> Cost:
-    """The cost (N,) of poses (N, D) whose feet or knees are below a floor at a height `level` (m) in the world; `weight`: per m^2."""
+    """The cost (N,) of poses (N, D) whose feet or knees are below a floor at a height `level` (m) in the body's frame; `weight`: per
+    m^2."""
     names = _lowest(picture)
-    return lambda poses: weight * (np.minimum(picture.points_world(poses, names)[..., 2] - level, 0) ** 2).sum(1)
+    return lambda poses: weight * (np.minimum(picture.body.points(poses, names=names)[..., 2] - level, 0) ** 2).sum(1)
 
 
 def _lowest(picture: Picture) -> list[str]:

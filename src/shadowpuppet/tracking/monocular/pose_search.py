@@ -68,7 +68,7 @@ def search_pose(picture: Picture, mask: NDArray[np.bool_], start: Array | None =
 def search_turned(picture: Picture, mask: NDArray[np.bool_], floor: float | None = None, moves: bool = True) -> CoarsePose:
     """As `search_pose`; if the person who faces the camera at the fitted height fits badly, the best of those who are turned, and, with a
     whole body, sit, kneel or squat lower or stand higher. A whole person, unless not `moves`, may be where the silhouette ends, too, on a
-    floor at a height in the world, metres, or at the distance of their stature."""
+    floor at a height in the body's frame, metres, or at the distance of their stature."""
     found = search_pose(picture, mask)
     stands = standing_place(picture, mask, floor, np.zeros(len(picture.body.skeleton.dofs))) if moves else None
     if stands is not None:

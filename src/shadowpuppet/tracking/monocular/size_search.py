@@ -25,6 +25,15 @@ CROTCH_GAP = 1 / 80
 """Smallest height of a gap between the legs, as a share of the picture's; smaller ones may be noise."""
 
 
+class Ground(NamedTuple):
+    """The floor before a camera."""
+
+    up: Array
+    """The vertical (3,) in the camera's frame."""
+    eye: float
+    """Height of the camera over it, metres."""
+
+
 @dataclass(frozen=True, eq=False)
 class PersonEstimate:
     """Estimate of a person's sizes and place."""
@@ -37,10 +46,13 @@ class PersonEstimate:
     """Horizontally from the camera to the middle of the body, metres."""
     elevation: float
     """Of the torso's lower edge, or of a whole body's pelvis, above the camera, metres."""
+    ground: Ground | None = None
+    """The floor on which a whole person stands; None if it is not known."""
 
     def picture(self, camera: Camera, body: str | Make = "rounded") -> Picture:
         """The camera's view of this person, as a body by name or made by a function of the sizes."""
-        return Picture(make_body(body, self.sizes), camera, place(camera, self.distance, self.elevation))
+        up, floor = (None, None) if self.ground is None else (self.ground.up, -self.ground.eye - self.elevation)
+        return Picture(make_body(body, self.sizes), camera, place(camera, self.distance, self.elevation, up), floor)
 
 
 class SearchVector(NamedTuple):

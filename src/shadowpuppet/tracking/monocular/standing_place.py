@@ -30,7 +30,8 @@ def soles_row(mask: Mask) -> float | None:
 
 def standing_place(picture: Picture, mask: Mask, floor: float | None, upright: Array) -> Array | None:
     """An upright pose (D,) moved so that its soles are in the last row of a mask (H, W), and its crown in the first or, on a floor, at most
-    there; None where the mask does not show that, and for an upper body. `floor`: its height in the world, metres, if it is known.
+    there; None where the mask does not show that, and for an upper body. `floor`: its height in the body's frame, metres, if it is
+    known.
 
     Where the crown is lower than that of a person who stands there, the pose is lowered, its straight legs below the floor.
     """
@@ -57,8 +58,7 @@ def standing_place(picture: Picture, mask: Mask, floor: float | None, upright: A
             crown, soles = slopes(far, raised)
             far *= (crown - soles) / (top - bottom)
     else:
-        raised = raised_to(picture, floor, outline)
-        below = floor - base_height(picture) - eye[2]
+        raised, below = floor - float(outline[:, 2].min()), floor - eye[2]
         if bottom >= 0 or below >= 0:
             return None
         far = below / bottom
@@ -70,18 +70,9 @@ def standing_place(picture: Picture, mask: Mask, floor: float | None, upright: A
     return pose
 
 
-def raised_to(picture: Picture, floor: float, outline: Array | None = None) -> float:
-    """How far (m) the upright body is to be raised so that its soles are on a floor at a height in the world, metres. `outline` (K, 3): its
-    outermost points, if they are known."""
-    if outline is None:
-        outline = _outline(picture, np.zeros(len(picture.body.skeleton.dofs)))
-    return float(floor - base_height(picture) - outline[:, 2].min())
-
-
-def base_height(picture: Picture) -> float:
-    """Height (m) of the frame of the body's base in the world."""
-    T = picture.camera.T_camera_world
-    return float((T[:3, :3].T @ (picture.T_camera_base[:3, 3] - T[:3, 3]))[2])
+def lowest(picture: Picture) -> float:
+    """Height (m) of the soles of the upright body in its frame."""
+    return float(_outline(picture, np.zeros(len(picture.body.skeleton.dofs)))[:, 2].min())
 
 
 def _outline(picture: Picture, pose: Array) -> Array:

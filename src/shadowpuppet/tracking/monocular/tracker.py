@@ -238,7 +238,7 @@ class MonocularTracker:
 
     @cached_property
     def floor(self) -> float | None:
-        """Height of the floor that a whole body stands on, in the world, metres; None if it is not known (`floor_below`)."""
+        """Height of the floor that a whole body stands on, in its frame, metres; None if it is not known (`floor_below`)."""
         return floor_below(self.picture)
 
     @cached_property

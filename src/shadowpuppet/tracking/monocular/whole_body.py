@@ -12,9 +12,10 @@ from shadowpuppet.body.sizes import BoneSizes, CardboxSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.monocular.ground import calibrated_ground, moved_to, shown_ground
 from shadowpuppet.tracking.monocular.pose_search import search_pose
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
-from shadowpuppet.tracking.monocular.standing_place import PLACE, raised_to, standing_place
+from shadowpuppet.tracking.monocular.standing_place import PLACE, lowest, standing_place
 from shadowpuppet.tracking.monocular.whole_distance import whole_distance, whole_poses
 from shadowpuppet.tracking.silhouette_cost import Observation
 
@@ -50,13 +51,13 @@ def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEsti
     whole: BoneSizes = sizes or whole_from_upper(body, found, upper.height)
     made = make_body(body, whole)
     neck = made.points(made.skeleton.pose()[None], names=["neck"])[0, 0, 2]
-    estimate = replace(upper, sizes=whole, elevation=upper.elevation + found.torso_height - neck)
+    estimate = replace(upper, sizes=whole, elevation=upper.elevation + found.torso_height - neck, ground=calibrated_ground(camera))
 
     def dressed(there: PersonEstimate, search: SearchPoses = _coarse_poses) -> PersonEstimate:
         return there if sizes is not None else _with_clothes(camera, masks, there, whole, body, search)
 
     if distance is None:
-        stands = _on_floor(camera, masks, estimate, body)
+        stands = _on_ground(camera, masks, estimate, body)
         stands = _standing(camera, masks, estimate, body) if stands is None and standing else stands
         if stands is None and not standing:
             factor = whole_distance(camera, masks, body, lambda factor: dressed(_at_distance(estimate, factor, neck)))
@@ -68,26 +69,28 @@ def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEsti
     return estimate
 
 
-def _on_floor(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str) -> PersonEstimate | None:
-    """The estimate upright on the calibration's floor, where the masks (H, W) end; None if that is not where the upper body is."""
-    level = 0.0  # in a calibration's world
-    found = _standing(camera, masks, estimate, body, level) if camera.oriented else None
-    if found is None or abs(np.log(found.distance / estimate.distance)) > AGREE:
-        return None
-    return replace(found, elevation=estimate.elevation + raised_to(estimate.picture(camera, body), level))
+def _on_ground(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str) -> PersonEstimate | None:
+    """The estimate upright where the masks (H, W) end on the floor: the calibration's, or else the one that the person shows; None if
+    neither is where the upper body is."""
+    for ground in (estimate.ground, lambda: shown_ground(camera, masks, estimate, body)):
+        known = ground() if callable(ground) else ground
+        found = None if known is None else _standing(camera, masks, moved_to(camera, estimate, known), body)
+        if found is not None and abs(np.log(found.distance / estimate.distance)) <= AGREE:
+            return found
+    return None
 
 
-def _standing(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str,
-              floor: float | None = None) -> PersonEstimate | None:
-    """The estimate at the median of the places at which a person who stands upright fits the masks (H, W); None if they show none. `floor`:
-    its height in the world, metres, if known."""
+def _standing(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str) -> PersonEstimate | None:
+    """The estimate at the median of the places at which a person who stands upright, on the floor if it is known, fits the masks (H, W);
+    None if they show none."""
     picture = estimate.picture(camera, body)
     places = picture.body.skeleton.dof_indices(PLACE)
     upright = np.zeros(len(picture.body.skeleton.dofs))
-    found = [pose[places] for mask in masks if (pose := standing_place(picture, mask, floor, upright)) is not None]
+    found = [pose[places] for mask in masks if (pose := standing_place(picture, mask, picture.floor, upright)) is not None]
     if not found:
         return None
     ahead, _, raised = np.median(found, axis=0).tolist()
+    raised = raised if picture.floor is None else picture.floor - lowest(picture)  # a seated person is lower
     return replace(estimate, distance=estimate.distance - ahead, elevation=estimate.elevation + raised)
 
 
