@@ -17,6 +17,15 @@ Cost = Callable[[Array], Array]
 """Function from poses (N, D) to costs (N,)."""
 
 
+class Soles(NamedTuple):
+    """Where a silhouette shows a person's soles."""
+
+    row: float
+    """Of the picture, pixels."""
+    cut: bool
+    """Whether the picture ends there: the soles are there or lower."""
+
+
 @dataclass(frozen=True, eq=False)
 class Observation:
     """A silhouette, its ignored pixels, and an additional cost."""
@@ -29,8 +38,8 @@ class Observation:
     arms: PartObservation | None = None
     """What shows some parts of the arms alone, if anything does."""
 
-    soles: float | None = None
-    """The row of the picture, pixels, in which a whole person's soles are; None if it is not known."""
+    soles: Soles | None = None
+    """A whole person's soles; None if they do not count."""
 
     @classmethod
     def of(cls, mask: ArrayLike, ignore: ArrayLike | None = None, also: Cost | None = None) -> Observation:

@@ -43,12 +43,12 @@ def whole_person() -> Finding:
 
 def _feet(mask: Mask) -> Array | None:
     """Where the feet are in a mask (H, W), column and row, and the height of the mask, pixels; None if it shows none."""
-    row = soles_row(mask)
-    if row is None:
+    soles = soles_row(mask)
+    if soles is None or soles.cut:
         return None
-    top, end = int(mask.any(1).argmax()), int(row + 0.5)
+    top, end = int(mask.any(1).argmax()), int(soles.row + 0.5)
     height = end - top
     low = mask[end - max(round(LOW * height), 1) : end]
     if np.count_nonzero(low) > FEET * len(low) * np.count_nonzero(mask) ** 0.5:
         return None
-    return np.array([np.median(np.nonzero(low)[1]), row, height], float)
+    return np.array([np.median(np.nonzero(low)[1]), soles.row, height], float)

@@ -15,7 +15,7 @@ from shadowpuppet.body.skeleton import Skeleton, bounded
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular.settings import pixel_scale
-from shadowpuppet.tracking.silhouette_cost import Cost
+from shadowpuppet.tracking.silhouette_cost import Cost, Soles
 
 USUAL = np.radians([(50, 70, -15), (88, 90, 0), (110, 120, -25), (0, 90, 55)])
 """Flexion of hip, knee and ankle (upward negative) of usual legs besides standing ones, rad: half a squat, seated, a squat, kneeling."""
@@ -71,15 +71,16 @@ def floor_below(picture: Picture) -> float | None:
     return floor if ankles - BELOW_FEET <= floor <= hips - ABOVE_FLOOR else None
 
 
-def soles_cost(picture: Picture, row: float, weight: float) -> Cost:
-    """The cost (N,) of poses (N, D) whose lower sole is not in a row of the picture, where the silhouette ends; `weight`: per squared
+def soles_cost(picture: Picture, soles: Soles, weight: float) -> Cost:
+    """The cost (N,) of poses (N, D) whose lower sole is not where the silhouette ends, or above the picture's end; `weight`: per squared
     pixel at 320 x 240. It is bounded: shoes may be like the floor. The silhouette's sides say less of the distance: clothes make a person
     wider by an unknown share."""
     camera, unit = picture.camera, pixel_scale(picture.camera.size)
     names = [f"{side}_{name}" for side in ("left", "right") for name in ("heel", "toe")]
 
     def cost(poses: Array) -> Array:
-        squared = (camera.project(picture.points_world(poses, names))[..., 1].max(1) - row) ** 2 / unit
+        off = camera.project(picture.points_world(poses, names))[..., 1].max(1) - soles.row
+        squared = (np.minimum(off, 0.0) if soles.cut else off) ** 2 / unit
         return weight * unit * np.where(np.isfinite(squared), squared / (1 + squared / SOLES_REACH**2), SOLES_REACH**2)
 
     return cost

@@ -70,7 +70,7 @@ def search_turned(picture: Picture, mask: NDArray[np.bool_], floor: float | None
     whole body, sit, kneel or squat lower or stand higher. A whole person, unless not `moves`, may be where the silhouette ends, too, on a
     floor at a height in the body's frame, metres, or at the distance of their stature."""
     found = search_pose(picture, mask)
-    stands = standing_place(picture, mask, floor, np.zeros(len(picture.body.skeleton.dofs))) if moves else None
+    stands = standing_place(picture, mask, floor, np.zeros(len(picture.body.skeleton.dofs)), farthest=True) if moves else None
     if stands is not None:
         found = max(found, search_pose(picture, mask, stands), key=lambda each: each.overlap)
     if found.overlap >= UNCERTAIN_OVERLAP or not mask.any():

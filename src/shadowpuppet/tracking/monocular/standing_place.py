@@ -12,6 +12,7 @@ from shadowpuppet.body.shapes import Hulls
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
+from shadowpuppet.tracking.silhouette_cost import Soles
 
 CUT_OFF_ROWS = 2
 """A silhouette that reaches this many first or last rows of the picture is cut off there."""
@@ -21,22 +22,23 @@ PLACE = ("root_x", "root_y", "root_z")
 """The DOF of a whole body's place."""
 
 
-def soles_row(mask: Mask) -> float | None:
-    """The row of the picture, pixels, in which the soles of a person with a mask (H, W) end; None if it is cut off there, or empty."""
-    if not mask.any() or mask[-CUT_OFF_ROWS:].any():
+def soles_row(mask: Mask) -> Soles | None:
+    """Where the soles of a person with a mask (H, W) are; None if it is empty."""
+    if not mask.any():
         return None
-    return float(np.flatnonzero(mask.any(1))[-1]) + 0.5
+    return Soles(float(np.flatnonzero(mask.any(1))[-1]) + 0.5, bool(mask[-CUT_OFF_ROWS:].any()))
 
 
-def standing_place(picture: Picture, mask: Mask, floor: float | None, upright: Array) -> Array | None:
+def standing_place(picture: Picture, mask: Mask, floor: float | None, upright: Array, farthest: bool = False) -> Array | None:
     """An upright pose (D,) moved so that its soles are in the last row of a mask (H, W), and its crown in the first or, on a floor, at most
     there; None where the mask does not show that, and for an upper body. `floor`: its height in the body's frame, metres, if it is
-    known.
+    known; `farthest`: whether a mask whose soles are cut off will do: the person is there, or nearer.
 
     Where the crown is lower than that of a person who stands there, the pose is lowered, its straight legs below the floor.
     """
     skeleton = picture.body.skeleton
-    if PLACE[0] not in skeleton.dof_names or soles_row(mask) is None:
+    soles = soles_row(mask)
+    if PLACE[0] not in skeleton.dof_names or soles is None or (soles.cut and not farthest):
         return None
     place, pose = skeleton.dof_indices(PLACE), upright.copy()
     pose[place] = 0.0

@@ -117,7 +117,7 @@ class MonocularTracker:
         narrow = self.settings.turned and self.is_narrow(mask, last)
         seen, stands = without(mask, state.unexplained), None
         if self.free:
-            stands = standing_place(self.picture, seen, self.floor, self.upright(last))
+            stands = standing_place(self.picture, seen, self.floor, self.upright(last), farthest=True)
             observation = replace(observation, soles=soles_row(seen))
         for cycle in range(self.settings.cycles):
             others = estimate  # values of the DOF outside a stage; later stages see the torso's new estimate, but not a limb's
