@@ -82,6 +82,15 @@ def test_every_picture_is_shown_somewhere_and_none_is_large():
     assert [name for name, size in sizes.items() if size > LARGEST.get(Path(name).suffix, LARGEST[""])] == []
 
 
+def test_no_text_of_the_project_was_left_half_merged():
+    marks = re.compile(r"^(<{7} |>{7} |={7}$)", re.MULTILINE)
+    folders = (ROOT, *(ROOT / name for name in ("docs", "benchmarks", "src", "tests", "examples", "packaging", ".ci", ".github")))
+    texts = [path for folder in folders for ending in ("md", "py", "toml", "sh", "yml", "js", "css", "html", "cff", "bib")
+             for path in (folder.glob if folder == ROOT else folder.rglob)(f"*.{ending}")]
+    assert ROOT / "docs" / "several_cameras.md" in texts
+    assert [str(path) for path in texts if marks.search(path.read_text("utf-8"))] == []
+
+
 def test_every_picture_says_what_it_shows():
     bare = [(page.name, path) for page in PAGES for text, path in re.findall(r"!\[([^]]*)\]\(([^)]+)\)", page.read_text("utf-8"))
             if len(text) < 8]  # fmt: skip
