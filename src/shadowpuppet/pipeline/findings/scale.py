@@ -13,7 +13,7 @@ from shadowpuppet.calibration.agreement import SETS_COMPARED
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.errors import RUINOUS, Finding
-from shadowpuppet.geometry import Array, evenly_spread
+from shadowpuppet.geometry import Array, evenly_spread, unit
 from shadowpuppet.pipeline.options import Options
 from shadowpuppet.pipeline.rig import Rig
 from shadowpuppet.threads import one_blas_thread
@@ -28,6 +28,8 @@ WRONG = 1.15
 """Ratio of scales that counts as wrong if the height is known; it is named from half of that way on, the square root."""
 FRAMES = 4
 """Number of moments in which the height is looked for."""
+ALONG = np.cos(np.radians(45))
+"""Cosine of the angle between two views from which on they do not cross."""
 SLENDER = 3.0
 """Least ratio of the longest extent of a person who stands to the geometric mean of the others: who sits has about 2.6."""
 
@@ -155,10 +157,14 @@ def _limits(height: float | None) -> tuple[float, float]:
 
 
 def _moment(cameras: Sequence[Camera], masks: Sequence[Mask | None], settings: MultiviewSettings) -> list[Moment]:
-    """A moment, if at least two cameras see a whole person: what reaches the picture's border may be cut off."""
+    """A moment, if at least two cameras see a whole person from sides that cross: what reaches the picture's border may be cut off, and
+    views from about the same or the opposite side leave the hull open along them."""
     whole = tuple(None if mask is None or not may_be_person(mask) else _whole(mask) for mask in masks)
     points = hull_points(cameras, whole, settings.hull) if sum(mask is not None for mask in whole) > 1 else np.zeros((0, 3))
-    return [Moment(whole, points)] if len(points) else []
+    if not len(points):
+        return []
+    views = unit(np.array([camera.centre for camera, mask in zip(cameras, whole) if mask is not None]) - points.mean(0))
+    return [Moment(whole, points)] if np.abs(views @ views.T).min() < ALONG else []
 
 
 def _whole(mask: Mask) -> Mask | None:

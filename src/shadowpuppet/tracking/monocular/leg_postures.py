@@ -32,6 +32,9 @@ CONTACT_WEIGHT, REACH = 20000.0, 0.15
 SOLES_REACH = 4.5
 """Distance (pixels at 320 x 240) of the soles from the silhouette's last row at which its cost no longer grows much."""
 
+CUT_OFF = 5.0
+"""How much farther below the end of a silhouette soles may be that the picture cuts off."""
+
 
 def posture_penalty(skeleton: Skeleton, poses: Array) -> Array:
     """As `Skeleton.posture_penalty` (N,) of poses (N, D), but each leg's is that of the nearest usual posture."""
@@ -72,15 +75,15 @@ def floor_below(picture: Picture) -> float | None:
 
 
 def soles_cost(picture: Picture, soles: Soles, weight: float) -> Cost:
-    """The cost (N,) of poses (N, D) whose lower sole is not where the silhouette ends, or above the picture's end; `weight`: per squared
-    pixel at 320 x 240. It is bounded: shoes may be like the floor. The silhouette's sides say less of the distance: clothes make a person
+    """The cost (N,) of poses (N, D) whose lower sole is not where the silhouette ends, or, if that is cut off, some pixels below; `weight`: per
+    squared pixel at 320 x 240. It is bounded: shoes may be like the floor. The silhouette's sides say less of the distance: clothes make a person
     wider by an unknown share."""
     camera, unit = picture.camera, pixel_scale(picture.camera.size)
     names = [f"{side}_{name}" for side in ("left", "right") for name in ("heel", "toe")]
 
     def cost(poses: Array) -> Array:
         off = camera.project(picture.points_world(poses, names))[..., 1].max(1) - soles.row
-        squared = (np.minimum(off, 0.0) if soles.cut else off) ** 2 / unit
+        squared = np.where(soles.cut & (off > 0), off / CUT_OFF, off) ** 2 / unit
         return weight * unit * np.where(np.isfinite(squared), squared / (1 + squared / SOLES_REACH**2), SOLES_REACH**2)
 
     return cost

@@ -20,7 +20,8 @@ from shadowpuppet.tracking.monocular.whole_distance import whole_distance, whole
 from shadowpuppet.tracking.silhouette_cost import Observation
 
 AGREE = 0.25
-"""Greatest difference, as a logarithm, of the distances by the floor and by the upper body: else the world's zero is no floor."""
+"""Greatest difference, as a logarithm, of the distances by the floor, in the moment of the nearest, and by the upper body: else the world's
+zero is no floor, or the person never stands."""
 WIDTH_FACTORS = np.arange(0.75, 1.61, 0.05)
 """Factors on widths that are tried."""
 WIDEST, REFITS = 3, 2
@@ -70,28 +71,36 @@ def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEsti
 
 
 def _on_ground(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str) -> PersonEstimate | None:
-    """The estimate upright where the masks (H, W) end on the floor: the calibration's, or else the one that the person shows; None if
-    neither is where the upper body is."""
-    for ground in (estimate.ground, lambda: shown_ground(camera, masks, estimate, body)):
-        known = ground() if callable(ground) else ground
-        found = None if known is None else _standing(camera, masks, moved_to(camera, estimate, known), body)
-        if found is not None and abs(np.log(found.distance / estimate.distance)) <= AGREE:
-            return found
+    """The estimate upright where the masks (H, W) end on the floor: the calibration's, if that is where the upper body is or the floor that
+    the person shows; or else the latter, unless the upper body is nearer, as of a person who never stands."""
+    known, shown = estimate.ground, shown_ground(camera, masks, estimate, body)
+    same = known is not None and shown is not None and abs(np.log(shown.eye / known.eye)) <= AGREE
+    for ground in (known, shown):
+        if ground is not None:
+            there = moved_to(camera, estimate, ground)
+            off = np.log(np.maximum(there.distance - _places(camera, masks, there, body)[:, 0], 1e-3) / there.distance)
+            if len(off) and (same or (off.min() <= AGREE and (ground is shown or off.max() >= -AGREE))):
+                return _standing(camera, masks, there, body)
     return None
 
 
 def _standing(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str) -> PersonEstimate | None:
-    """The estimate at the median of the places at which a person who stands upright, on the floor if it is known, fits the masks (H, W);
-    None if they show none."""
-    picture = estimate.picture(camera, body)
-    places = picture.body.skeleton.dof_indices(PLACE)
-    upright = np.zeros(len(picture.body.skeleton.dofs))
-    found = [pose[places] for mask in masks if (pose := standing_place(picture, mask, picture.floor, upright)) is not None]
-    if not found:
+    """The estimate at the median of its places in masks (H, W), standing on the floor if that is known; None if they show none."""
+    places = _places(camera, masks, estimate, body)
+    if not len(places):
         return None
-    ahead, _, raised = np.median(found, axis=0).tolist()
+    ahead, _, raised = np.median(places, axis=0).tolist()
+    picture = estimate.picture(camera, body)
     raised = raised if picture.floor is None else picture.floor - lowest(picture)  # a seated person is lower
     return replace(estimate, distance=estimate.distance - ahead, elevation=estimate.elevation + raised)
+
+
+def _places(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str) -> Array:
+    """The places (K, 3) at which the person, upright, on the floor if it is known, fits those of some masks (H, W) that show one."""
+    picture = estimate.picture(camera, body)
+    dofs, upright = picture.body.skeleton.dof_indices(PLACE), np.zeros(len(picture.body.skeleton.dofs))
+    found = [pose[dofs] for mask in masks if (pose := standing_place(picture, mask, picture.floor, upright)) is not None]
+    return np.array(found).reshape(-1, len(PLACE))
 
 
 def _at_distance(estimate: PersonEstimate, factor: float, neck: float) -> PersonEstimate:
