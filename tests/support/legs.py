@@ -24,7 +24,14 @@ def over_floor(name: str, high: float = 1.2, hips: float = HIPS) -> Picture:
     body = make_body(name, average_sizes(name, HEIGHT))
     base = place(cam, 2.5, 0.0)
     down = Picture(body, cam, base).points_world(body.skeleton.pose()[None], ["left_hip"])[0, 0, 2]
-    return Picture(body, cam, place(cam, 2.5, hips - down))
+    return Picture(body, cam, place(cam, 2.5, hips - down), down - hips - high)
+
+
+def wide(view: Picture) -> Picture:
+    """The same body before a camera that sees people who are near, too."""
+    matrix = view.camera.matrix.copy()
+    matrix[[0, 1], [0, 1]] *= 0.55
+    return replace(view, camera=replace(view.camera, matrix=matrix))
 
 
 def bent(skeleton: Skeleton, hip: float, knee: float, ankle: float = 0.0) -> Array:

@@ -64,19 +64,20 @@ def test_upper_bodies_are_as_before(name, rng):
 
 @pytest.mark.parametrize("name", WHOLE)
 def test_a_floor_is_the_person_s_if_the_camera_s_place_is_known_and_their_legs_reach_it(name):
-    assert floor_below(over_floor(name)) == 0.0
-    assert floor_below(over_floor(name, hips=0.4)) == 0.0  # of whoever sits, the feet are in front of the hips
+    view = over_floor(name)
+    assert floor_below(view) == view.floor
+    low = over_floor(name, hips=0.4)
+    assert floor_below(low) == low.floor  # of whoever sits, the feet are in front of the hips
     assert floor_below(over_floor(name, hips=1.4)) is None
     assert floor_below(over_floor(name, hips=0.0)) is None
-    view = over_floor(name)
-    assert floor_below(replace(view, camera=replace(view.camera, oriented=False))) is None
+    assert floor_below(replace(view, floor=None)) is None
 
 
 @pytest.mark.parametrize("name", WHOLE)
 def test_feet_below_the_floor_cost_and_the_lowest_point_off_it_where_contact_is_sought(name):
     view = over_floor(name, hips=2.0)
     pose = view.body.skeleton.pose()[None]
-    heights = view.points_world(pose, leg_postures._lowest(view))[0, :, 2]
+    heights = view.body.points(pose, names=leg_postures._lowest(view))[0, :, 2]
     low = heights.min()
     assert floor_cost(view, low - 0.01, 100.0)(pose)[0] == 0
     above = low + 0.1
@@ -95,7 +96,7 @@ def test_stages_of_legs_know_the_floor_and_those_of_arms_do_not(name):
     standing = view.body.skeleton.pose()[None]
     observation = Observation.of(view.mask(standing[0]))
     for part, number in (("left_leg", 3), ("left_arm", 1)):
-        costs = make_stage(view, settings, part, floor=0.0).extra_costs(observation, standing[0])
+        costs = make_stage(view, settings, part, floor=view.floor).extra_costs(observation, standing[0])
         assert len(costs) == number
         assert (sum(cost(standing)[0] for cost in costs) > 1000) == (number == 3)
     assert len(make_stage(view, settings, "left_leg").extra_costs(observation, standing[0])) == 1
