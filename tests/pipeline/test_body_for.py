@@ -43,10 +43,9 @@ def test_who_walks_or_sits_down_with_feet_in_the_picture_is_tracked_whole(masks,
 
 
 def test_a_body_that_is_said_or_a_paper_s_or_given_sizes_or_references_is_kept(tmp_path):
-    assert not Options().body_is_known(references=False)
-    assert Options().body_is_known(references=True)
+    assert not Options().body_is_known
     for values in ({"body": "rounded"}, {"preset": "liu2011"}, {"person": str(tmp_path / "person.toml")}, {"tracker": {"body": "boxes"}}):
-        assert make_options(values).body_is_known(references=False)
+        assert make_options(values).body_is_known
     whole = Options().with_body("anatomical")
     assert (whole.body, whole.tracker.body) == ("anatomical", "anatomical")
     assert whole == make_options({"body": "anatomical"})

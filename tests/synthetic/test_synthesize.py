@@ -299,7 +299,8 @@ def test_made_recordings_can_be_looked_at_and_tracked(shell):
 @pytest.mark.filterwarnings("ignore:.*nothing of the person is hidden")
 def test_references_are_whole_or_not_there(tmp_path):
     for ahead, count in ((0.8, 0), (-0.8, 3)):
-        made = make_recording(replace(SMALL, scene=replace(SMALL.scene, obstacles=(Obstacle(kind="pillar", ahead=ahead),))), tmp_path)
+        made = make_recording(replace(SMALL, scene=replace(SMALL.scene, obstacles=(Obstacle(kind="pillar", ahead=ahead),))), tmp_path,
+                              force=True)
         assert len(made.references) == count
 
 
@@ -350,7 +351,7 @@ def test_training_motion_is_another_or_none_where_the_spec_says_so(tmp_path):
     assert len(read_joints(made["other"].training).times) == len(read_joints(made["same"].training).times) + 2  # half a second more
     truths = [one.truth.read_bytes() for one in made.values()]
     assert truths[0] == truths[1] == truths[2]
-    assert make_recording(replace(spec, training=()), tmp_path / "same").training is None  # the old one is not taken for it
+    assert make_recording(replace(spec, training=()), tmp_path / "same", force=True).training is None  # the old one is not taken for it
 
 
 def test_the_spec_shown_is_the_spec_made(shell, tmp_path):
@@ -427,10 +428,13 @@ def test_making_again_leaves_nothing_of_the_old_and_all_that_is_the_users(tmp_pa
     spec = replace(SMALL, rate=1)
     make_recording(spec, tmp_path)
     ring = replace(spec, cameras=(Viewpoint(),), ring=Ring(count=3, size=(48, 32)), scene=Scene(empty_seconds=1, bystanders=(Bystander(),)))
-    make_recording(ring, tmp_path)
+    with pytest.raises(RecordingError, match="a made recording of another spec"):
+        make_recording(ring, tmp_path)
+    assert (tmp_path / "video" / "cam.mp4").exists()
+    make_recording(ring, tmp_path, force=True)
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "video" / "cam2.part.mp4").write_bytes(b"")
-    recording = make_recording(spec, tmp_path)
+    recording = make_recording(spec, tmp_path, force=True)
     assert [view.camera.name for view in recording.views] == ["cam"]
     assert recording.training is None
     left = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file() and "references" not in path.parts}

@@ -89,7 +89,7 @@ def synthesize(spec: Annotated[Path | None, Parameter(help="Spec file, TOML, as 
                seed: Annotated[int | None, flag("Seed of the random numbers: the same seed makes the same recording.")] = None,
                list_specs: Annotated[bool, switch("List the named specs and stop.", name="--list")] = False,
                show_spec: Annotated[bool, switch("Print the resulting spec and stop.")] = False,
-               force: Annotated[bool, switch("Write into a folder that has other files in it.")] = False,
+               force: Annotated[bool, switch("Replace another made recording, or write into a folder that has other files in it.")] = False,
                quiet: Quiet = False, flags: SpecFlags = None) -> None:  # fmt: skip
     """Make a recording with known truth (films, exact masks, joints, calibration) from a spec file or a few flags."""
     from shadowpuppet.cli.terminal import terminal

@@ -150,10 +150,11 @@ class Options:
         """Whether keypoints are used where there are any."""
         return "keypoints" in self.evidence if self.evidence is not None else self.preset == "default"
 
-    def body_is_known(self, references: bool) -> bool:
-        """Whether one camera's body does not depend on the film: it is said, a paper's, or that of given sizes or of `references`."""
+    @property
+    def body_is_known(self) -> bool:
+        """Whether one camera's body does not depend on the film: it is said, a paper's, or that of given sizes."""
         usual = MonocularSettings().body
-        return references or self.body is not None or self.preset != "default" or self.person is not None or self.tracker.body != usual
+        return self.body is not None or self.preset != "default" or self.person is not None or self.tracker.body != usual
 
     def with_body(self, body: BodyName) -> Options:
         """The options with another body for one camera."""

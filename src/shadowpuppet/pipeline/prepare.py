@@ -119,7 +119,7 @@ def check_options(options: Options, rig: Rig) -> None:
 
 def for_person(rig: Rig, options: Options) -> Options:
     """The options with one camera's body of given sizes, if nothing says another. Raises `FormatError` for a person that cannot be read."""
-    if options.person is None or is_for_rig(rig, options) or replace(options, person=None).body_is_known(references=False):
+    if options.person is None or is_for_rig(rig, options) or replace(options, person=None).body_is_known:
         return options
     sizes = read_person(options.person).sizes
     return options if isinstance(sizes, CardboxSizes) else options.with_body(kind_of(sizes))
@@ -128,7 +128,7 @@ def for_person(rig: Rig, options: Options) -> Options:
 def for_film(survey: Survey, options: Options) -> Options:
     """The options with the body that one camera's film asks for, if nothing else determines it."""
     look, rig = survey.look, survey.rig
-    if not isinstance(look, Look) or is_for_rig(rig, options) or options.body_is_known(bool(rig.recording.references)):
+    if not isinstance(look, Look) or is_for_rig(rig, options) or options.body_is_known:
         return options
     return options.with_body(look.body)
 
@@ -136,7 +136,7 @@ def for_film(survey: Survey, options: Options) -> Options:
 def as_before(folder: str | Path, options: Options) -> Options:
     """The options with the body of a run in a folder that was broken off, where the film determined it."""
     path = Path(folder) / "run.toml"
-    before = read_options(path).get("body") if path.exists() and not options.body_is_known(references=False) else None
+    before = read_options(path).get("body") if path.exists() and not options.body_is_known else None
     return options.with_body(before) if before in WHOLE else options
 
 

@@ -20,24 +20,24 @@ from shadowpuppet.video import open_frames, write_image
 def make_recording(spec: Spec, folder: str | Path, listener: Listener | None = None, force: bool = False) -> Recording:
     """Make the synthetic recording of `spec`, with its seed, in `folder`, and read it back.
 
-    An earlier synthetic recording in `folder` is replaced. Any other non-empty folder is only written to with `force`, which replaces
-    files of the same names and keeps the rest. Raises `RecordingError` otherwise, or if something cannot be written, and a
-    `ShadowPuppetError` if a motion file cannot be used.
+    An earlier recording of the same spec in `folder` is made again. Any other non-empty folder is only written to with `force`, which
+    replaces a made recording, or files of the same names, and keeps the rest. Raises `RecordingError` otherwise, or if something cannot be
+    written, and a `ShadowPuppetError` if a motion file cannot be used.
     """
     folder, listener = Path(folder), listener or Listener()
     for gesture in (*spec.motion, *(spec.training or ()), *(other.motion for other in spec.scene.bystanders)):
         if gesture.file is not None:  # raises for a file that cannot be used, before anything is removed
             perform(replace(spec, motion=(gesture,)), np.random.default_rng(0))
-    clear(folder, force)
+    clear(folder, spec, force)
     listener.begin("drawing")
     synthesize(spec, folder, tell=Drawing(listener))
     return read_recording(folder)
 
 
-def clear(folder: Path, force: bool = False) -> None:
-    """Remove the files of an earlier synthetic recording from `folder`, and no others.
+def clear(folder: Path, spec: Spec, force: bool = False) -> None:
+    """Remove the files of an earlier synthetic recording of the same spec, or with `force` of any, from `folder`, and no others.
 
-    Raises `RecordingError` if `folder` is a file, holds files but no synthetic recording (unless `force`), or a file cannot be removed.
+    Raises `RecordingError` if `folder` is a file, holds files but no such recording (unless `force`), or a file cannot be removed.
     """
     if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
         return
@@ -48,6 +48,8 @@ def clear(folder: Path, force: bool = False) -> None:
         raise RecordingError(
             f"{folder}: found files in it that are no made recording; choose another folder, or write among them with --force"
         )
+    if old is not None and old != spec and not force:
+        raise RecordingError(f"{folder}: found a made recording of another spec; choose another folder, or replace it with --force")
     for path in files_of(old, folder) if old is not None else ():
         try:
             path.unlink(missing_ok=True)

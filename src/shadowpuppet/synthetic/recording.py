@@ -234,7 +234,8 @@ def _write_subject(path: Path, spec: Spec) -> None:
     if "height" in spec.tells:
         lines.append(f"height = {spec.body.stature:.3f}     # metres, shoes on")
     views = spec.views()
-    if "distance" in spec.tells and len(views) == 1:
+    stays = not any(gesture.motion in ("walk", "jog", "mocap") for gesture in spec.motion)
+    if "distance" in spec.tells and len(views) == 1 and stays:  # who walks has no one distance
         distance = views[0].distance
         lines.append(f"distance = {distance:.3f}   # metres, camera to the middle of the body, before the first movement")
     if spec.scene.bystanders and len(views) > 1:

@@ -128,7 +128,7 @@ class Spec:
     still: Annotated[float, Field(ge=0, le=3)] = 1.0
     """Factor on sway and tremor; 0: none."""
     tells: Literal["height and distance", "height", "distance", "nothing"] = "height and distance"
-    """Data of the subject that recording.toml states."""
+    """Data of the subject that recording.toml states; no distance of a person who walks."""
     seed: Annotated[int | tuple[int, ...], PlainValidator(_seed)] = 0
     """Seed of motion and noise if no generator is given: a whole number, or several."""
 

@@ -81,7 +81,7 @@ def _look(footage: Footage, film: FilmSurvey, options: Options) -> Look:
         return look
     sits = sitting_cautions(film.masks, [frame.time for frame in sample.frames])
     look = replace(look, body=body_for(film.masks, bool(sits)))
-    whole = options.tracker.body if options.body_is_known(bool(footage.recording.references)) else look.body
+    whole = options.tracker.body if options.body_is_known else look.body
     posture = feet_cautions({camera.name: look.quality.border["bottom"]}) if whole in WHOLE else sits
     posture += [whole_person()] if whole != options.tracker.body else []
     several = _several_people(film, HARMFUL if options.people is None else NOTED)
