@@ -90,6 +90,8 @@ class Finding:
     """`NOTED`: lengths or details may be off; `HARMFUL`: joints are; `RUINOUS`: most of the run is."""
     evidence: Mapping[str, float | str] = field(default_factory=dict, hash=False)
     """The measured figures that say so, by name."""
+    what: str = ""
+    """The one camera or file that it is about."""
 
     @classmethod
     def of(cls, words: str, short: str, severity: int, **evidence: float | str) -> Finding:
@@ -110,7 +112,7 @@ class Finding:
 
     def about(self, what: str) -> Finding:
         """The same finding about one camera or file, which both forms name first."""
-        return replace(self, words=f"{what}: {self.words}", short=f"{what}: {self.short}")
+        return replace(self, words=f"{what}: {self.words}", short=f"{what}: {self.short}", what=what)
 
 
 def choices(names: Iterable[str]) -> str:

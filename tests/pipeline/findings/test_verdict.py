@@ -55,6 +55,12 @@ def test_reasons_are_the_three_heaviest_each_once():
     assert verdict.reasons == ("d", "b", "c")
 
 
+def test_a_reason_that_cameras_share_is_said_once_with_their_names():
+    shared, other = Finding("compressed too much", "compressed: use less", HARMFUL), caution(NOTED, "b")
+    verdict = verdict_of([shared.about("cam1"), shared.about("cam2"), other, caution(HARMFUL).about("cam1"), shared.about("cam4")])
+    assert verdict.reasons == ("cam1, cam2, cam4: compressed: use less", "cam1: x", "b")
+
+
 def test_a_finding_reads_as_its_sentence_and_survives_copies():
     made = Finding("long and whole", "short", HARMFUL)
     for same in (made, copy.deepcopy(made), copy.copy(made)):
@@ -77,7 +83,7 @@ def test_a_findings_words_hold_its_figures_and_no_name_in_them_is_a_figure():
 
 def test_findings_are_saved_with_their_evidence():
     (saved,) = json.loads(json_text(replace(LOOK, findings=(Finding.of("{x:.1f}", "x", NOTED, x=np.float64(1.25)),))))["findings"]
-    assert saved == {"words": "1.2", "short": "x", "severity": NOTED, "evidence": {"x": 1.25}}
+    assert saved == {"words": "1.2", "short": "x", "severity": NOTED, "evidence": {"x": 1.25}, "what": ""}
 
 
 def test_a_recording_that_cannot_be_tracked_is_bad():

@@ -85,8 +85,17 @@ def verdict_of(findings: Iterable[Finding], in_depth: Sequence[Finding] = ()) ->
     """The verdict that findings lead to: bad with a ruinous one, doubtful with a harmful one, else good; and those about depth alone."""
     findings = list(findings)
     word, depth = _word(findings), _word([*findings, *in_depth])
-    reasons = tuple(dict.fromkeys(each.short for each in ranked([*findings, *in_depth])))[:MOST]
-    return Verdict(word, reasons, depth if depth != word else None)
+    return Verdict(word, tuple(_reasons([*findings, *in_depth]))[:MOST], depth if depth != word else None)
+
+
+def _reasons(findings: Iterable[Finding]) -> Iterator[str]:
+    """The findings' short words, the gravest first; those that several cameras share once."""
+    about = dict[str, list[str]]()
+    for each in ranked(findings):
+        about.setdefault(each.short.removeprefix(f"{each.what}: ") if each.what else each.short, []).append(each.what)
+    for short, names in about.items():
+        known = [name for name in dict.fromkeys(names) if name]
+        yield f"{', '.join(known)}: {short}" if known else short
 
 
 def _word(findings: Sequence[Finding]) -> Word:
