@@ -122,9 +122,9 @@ class MaskQuality:
 
     def _unsteady(self) -> Iterator[Finding]:
         remedy = REMEDY if self.ready else (
-                  "the person hardly differs from the background, or was taken for it where it was made from the film; give a picture "
-                  "of the empty scene, more light, or other clothes")
-        short = "parts of the person vanish: " + ("make the masks again" if self.ready else "film the empty scene")
+                  "the person hardly differs from the background; more light, other clothes or another wall help, and a picture of the "
+                  "empty scene where there is none")
+        short = "parts of the person vanish: " + ("make the masks again" if self.ready else "more light, or other clothes")
         if self.area_jumps > WARN_JUMPS:
             yield Finding(f"the area of the silhouette changes by over {_percent(AREA_JUMP)} at once in {_percent(self.area_jumps)} of the "
                           f"frames, as parts are lost and found: {remedy}", short, HARMFUL, {"percent": 100 * self.area_jumps})

@@ -85,7 +85,7 @@ def _look(footage: Footage, film: FilmSurvey, options: Options) -> Look:
     posture = feet_cautions({camera.name: look.quality.border["bottom"]}) if whole in WHOLE else sits
     posture += [whole_person()] if whole != options.tracker.body else []
     several = _several_people(film, HARMFUL if options.people is None else NOTED)
-    doubts = (*several, *posture, *_doubts(look, footage), *film_cautions(footage),
+    doubts = (*several, *posture, *_doubts(look, footage, whole in WHOLE), *film_cautions(footage),
               *recovery_cautions([camera.name], [film.silhouettes]), *added_cautions(look.added))
     return replace(look, findings=(*doubts, *look.quality.warnings()))
 
@@ -105,7 +105,8 @@ def known_scale(footage: Footage) -> str:
     return " and ".join(known) or f"average height of {AVERAGE_HEIGHT:.2f} m, assumed"
 
 
-def _doubts(look: Look, footage: Footage) -> list[Finding]:
+def _doubts(look: Look, footage: Footage, whole: bool) -> list[Finding]:
+    """What is in doubt before anything is tracked; `whole`: whether a whole body is, whose soles show the distance."""
     doubts, subject = list[Finding](), footage.recording.subject
     if footage.keypoints is not None:
         doubts.append(Finding("keypoints are not used beside one camera's silhouettes: --evidence keypoints tracks the whole person by "
@@ -120,7 +121,7 @@ def _doubts(look: Look, footage: Footage) -> list[Finding]:
                                  "upright film: --fov of a phone is then about {upright:.0f}", NOTED, fov=look.fov, upright=UPRIGHT))
     if subject.height is None and subject.distance is None:
         doubts.append(unknown_scale(look.scale))
-    elif subject.distance is None and not footage.recording.references:
+    elif subject.distance is None and not footage.recording.references and not whole:
         doubts.append(Finding("the distance is not known: it is found from the silhouette, often a tenth too near, and all places are as "
                               "wrong as that; measure it and give --distance, or take references",
                               "distance not known: measure it, give --distance", NOTED if look.calibrated else HARMFUL))
