@@ -312,11 +312,13 @@ def _whole() -> list[postures.Film]:
     return [film for film in postures.films() if film.body is not None]
 
 
-TRACK = {"monocular": track_monocular, "monocular_whole": partial(track_monocular, kind="monocular_whole"), "multiview": track_multiview, **{kind: partial(track_multiview, kind=kind) for kind in SIGHTINGS}}
-MADE: dict[str, Callable[[], list[Path]]] = {"monocular": lambda: made_ground(GROUND),
-                                             "monocular_whole": lambda: [WHOLE / film.spec.name for film in whole_people.films()],
-                                             **dict.fromkeys(("multiview", *SIGHTINGS), _rings),
-                                             "keypoints_one": lambda: [*_rings(), *(POSTURES / film.spec.name for film in _whole())]}
+TRACK = {"monocular": track_monocular, "monocular_whole": partial(track_monocular, kind="monocular_whole"),
+         "multiview": track_multiview, **{kind: partial(track_multiview, kind=kind) for kind in SIGHTINGS}}  # fmt: skip
+MADE: dict[str, Callable[[], list[Path]]] = {
+    "monocular": lambda: made_ground(GROUND), "monocular_whole": lambda: [WHOLE / film.spec.name for film in whole_people.films()],
+    **dict.fromkeys(("multiview", *SIGHTINGS), _rings),
+    "keypoints_one": lambda: [*_rings(), *(POSTURES / film.spec.name for film in _whole())],
+}  # fmt: skip
 
 
 def read_runs(files: Iterable[Path]) -> list[Tracked]:

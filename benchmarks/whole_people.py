@@ -1,6 +1,7 @@
 """Whole people before one camera: made films of people who walk, turn, sit down, squat, kneel and stand, tracked with the whole body.
 
-    python benchmarks/whole_people.py [--films "walk across;squat"] [--body rounded] [--folder FOLDER] [--against FILE] [--json FILE]
+    python benchmarks/whole_people.py [--films "walk across;squat"] [--body rounded] [--against FILE] [--json FILE]
+                                     [--markdown docs/accuracy.md]
 
 The films are made where they are missing, in build/whole_people. The camera's lens and the person's height are known; its place over the
 floor in every other film. `calibrate_doubt.py` chooses the factors of doubt of a whole body by them.
@@ -12,7 +13,7 @@ import argparse
 import json
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -20,10 +21,11 @@ from typing import NamedTuple
 import numpy as np
 import postures
 import smallest
+from faults import into_page
 from numpy.typing import NDArray
 
 from shadowpuppet.io.motion.motion_files import read_truth
-from shadowpuppet.motion.limbs import DOUBTFUL, joints_of_limbs, limb_of
+from shadowpuppet.motion.limbs import joints_of_limbs, limb_of
 from shadowpuppet.motion.metrics import FAR_ERROR, joint_errors
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.pipeline.options import make_options
@@ -34,6 +36,7 @@ from shadowpuppet.synthetic.movement.resting import PostureName
 from shadowpuppet.synthetic.person.mannequin import PersonKind
 
 HERE = Path(__file__).resolve().parent.parent / "build" / "whole_people"
+TABLE = "whole people"
 NEAR = 0.1
 """Error (m) below which a doubtful joint is a false alarm."""
 WALK, LINE, ROUND = Gesture(motion="walk", seconds=5.0), {"path": "line", "size": 2.2}, {"path": "circle", "size": 1.0}
@@ -158,6 +161,10 @@ def _doubtful(motion: Motion, names: tuple[str, ...]) -> NDArray[np.bool_]:
     return np.array([[status[column] != "tracked" for column in columns] for status in motion.limb_status])
 
 
+def _mean(figures: Sequence[Figures]) -> Figures:
+    return Figures(*np.nanmean(np.array(figures), axis=0).tolist())
+
+
 def chosen(text: str, small: bool, shift: int) -> Iterator[postures.Film]:
     """The films named, with ; between them; all without."""
     wanted = [name.strip() for name in text.split(";") if name.strip()]
@@ -169,7 +176,8 @@ def chosen(text: str, small: bool, shift: int) -> Iterator[postures.Film]:
 
 
 def _smallest(folder: Path) -> list[object]:
-    return ["--films", "box", "--small", "--folder", folder, "--json", folder / "figures.json"]
+    page = smallest.copy(HERE.parents[1] / "docs" / "accuracy.md", folder)
+    return ["--films", "box", "--small", "--folder", folder, "--markdown", page, "--json", folder / "figures.json"]
 
 
 def main() -> None:
@@ -183,15 +191,20 @@ def main() -> None:
     parser.add_argument("--runs", type=Path, help="keep the runs there")
     parser.add_argument("--against", type=Path, help="figures of an earlier run, shown in brackets")
     parser.add_argument("--json", type=Path, help="write the figures there")
+    parser.add_argument("--markdown", type=Path, help="write the table there too, at its place in docs/accuracy.md")
     args = smallest.parse(parser, _smallest)
     before = {} if args.against is None else {name: Figures(**values) for name, values in json.loads(args.against.read_text()).items()}
-    found = dict[str, Figures]()
+    found, lines = dict[str, Figures](), [HEAD]
     print(HEAD)
     for film in chosen(args.films, args.small, args.shift):
         found[film.name] = measured(film, args.folder, args.body, None if args.runs is None else args.runs / film.spec.name)
-        print(found[film.name].line(film.name, before.get(film.name)), flush=True)
-    mean = Figures(*np.nanmean(np.array(list(found.values())), axis=0).tolist())
-    print(mean.line("mean", Figures(*np.nanmean(np.array([before[name] for name in found if name in before]), axis=0)) if before else None))
+        lines.append(found[film.name].line(film.name, before.get(film.name)))
+        print(lines[-1], flush=True)
+    then = [before[name] for name in found if name in before]
+    lines.append(_mean(list(found.values())).line("mean", _mean(then) if then else None))
+    print(lines[-1])
+    if args.markdown is not None:
+        into_page(args.markdown, TABLE, "\n".join(lines))
     if args.json is not None:
         args.json.write_text(json.dumps({name: each._asdict() for name, each in found.items()}, indent=1), encoding="utf-8")
 

@@ -9,7 +9,7 @@ import pytest
 from legs import HIPS, bent, over_floor, wide
 
 from shadowpuppet.body.models import WHOLE, average_sizes, make_body
-from shadowpuppet.camera.rasterize import Picture, place
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.tracking.monocular.leg_postures import CUT_OFF, SOLES_REACH, soles_cost
 from shadowpuppet.tracking.monocular.settings import make_settings, pixel_scale
 from shadowpuppet.tracking.monocular.size_search import Ground, PersonEstimate

@@ -120,8 +120,8 @@ class MonocularDoubt:
         return evidence, Before(mask, still, since)
 
     def _of_whole(self, pose: Array, points: Array, mask: Mask) -> dict[str, Array]:
-        """Components (L, 3) of a whole body with landmarks `points` (L, 3): their depths from the pelvis, twice, by which they would move if
-        the person faced the other way; the distances from the other side's joints; and those of the pelvis from where it would be if the
+        """Components (L, 3) of a whole body with landmarks `points` (L, 3): their depths from the pelvis, twice, by which they would move
+        if the person faced the other way; the distances from the other side's joints; and those of the pelvis from where it would be if the
         person stood upright in a mask (H, W), by stature and by the floor, or metres where the mask does not show that."""
         tracker, root = self.tracker, points[self.names.index("pelvis")]
         upright, found = tracker.upright(pose), dict[str, Array]()

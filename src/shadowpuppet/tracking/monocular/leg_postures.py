@@ -75,9 +75,9 @@ def floor_below(picture: Picture) -> float | None:
 
 
 def soles_cost(picture: Picture, soles: Soles, weight: float) -> Cost:
-    """The cost (N,) of poses (N, D) whose lower sole is not where the silhouette ends, or, if that is cut off, some pixels below; `weight`: per
-    squared pixel at 320 x 240. It is bounded: shoes may be like the floor. The silhouette's sides say less of the distance: clothes make a person
-    wider by an unknown share."""
+    """The cost (N,) of poses (N, D) whose lower sole is not where the silhouette ends, or, if that is cut off, some pixels below; `weight`:
+    per squared pixel at 320 x 240. It is bounded: shoes may be like the floor. The silhouette's sides say less of the distance: clothes
+    make a person wider by an unknown share."""
     camera, unit = picture.camera, pixel_scale(picture.camera.size)
     names = [f"{side}_{name}" for side in ("left", "right") for name in ("heel", "toe")]
 
