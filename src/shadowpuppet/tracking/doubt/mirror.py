@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.segments import dofs_of
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
@@ -70,7 +71,7 @@ class Mirrors:
         """Places of the arms, in the world, that differ from the estimate, `points` (L, 3), and from one another; the likelier first."""
         found, T = list[Mode](), self.picture.camera.T_camera_world
         for (_, chain), more, own in zip(self.arms, images.more, images.points):
-            for n, weight in _weights(points[chain[1:]], own[:, chain[1:]], more).items():
+            for n, weight in _weights(points[chain[1:]], own[:, chain[1:]], more, kind_before_one(self.picture.body)).items():
                 moved = np.linalg.norm(own[n] - points, axis=1) > MOVED
                 places = np.where(moved[:, None], (own[n] - T[:3, 3]) @ T[:3, :3], np.nan)
                 found.append(Mode(limb_of(self.picture.body.landmark_names[chain[0]]), weight, places))
@@ -125,14 +126,19 @@ def _mirrored(chains: Array) -> Array:
     return (chains[:, None, :1] + np.cumsum(chosen, axis=2)).reshape(len(chains), len(FLIPS), 6)
 
 
-def _weights(ends: Array, images: Array, more: Array) -> dict[int, float]:
+def kind_before_one(body: Body) -> str:
+    """The calibrated model of a body before one camera."""
+    return "monocular_whole" if body.hem is None else "monocular"
+
+
+def _weights(ends: Array, images: Array, more: Array, kind: str = "monocular") -> dict[int, float]:
     """Weights, by index, of those images (3, 2, 3) of elbow and wrist that differ from the estimate's, `ends` (2, 3), and from cheaper
-    ones, the cheapest first. `more` (3,): what they cost more, pixels at 320 x 240."""
+    ones, the cheapest first. `more` (3,): what they cost more, pixels at 320 x 240; `kind`: of `kind_before_one`."""
     places, kept = [ends], list[int]()
     for n in np.argsort(more, kind="stable").tolist():
         if all(np.linalg.norm(images[n] - place, axis=1).max() >= APART for place in places):
             places.append(images[n])
             kept.append(n)
-    weights = variance_model("monocular").modes
+    weights = variance_model(kind).modes
     assert weights is not None
     return {n: share for n, share in zip(kept, weights.shares(more[kept]).tolist()) if share >= LEAST}

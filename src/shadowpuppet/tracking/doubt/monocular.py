@@ -18,7 +18,7 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, joints_of_limbs, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import levers_of, limb_of_part
-from shadowpuppet.tracking.doubt.mirror import Mirrors
+from shadowpuppet.tracking.doubt.mirror import Mirrors, kind_before_one
 from shadowpuppet.tracking.doubt.steps import CONSTANT, DISTANCE, stillness
 from shadowpuppet.tracking.frozen import is_frozen, same_silhouette
 from shadowpuppet.tracking.monocular.standing_place import standing_place
@@ -65,7 +65,7 @@ class MonocularDoubt:
         evidence, now = self.evidence(state, mask, seconds, before)
         R = picture.camera.T_camera_world[:3, :3].T
         skeleton = picture.body.skeleton
-        found = state_doubt(self.kind, evidence, self.names, skeleton, picture.points, state.pose, state.status, R)
+        found = state_doubt(kind_before_one(picture.body), evidence, self.names, skeleton, picture.points, state.pose, state.status, R)
         return (found._replace(limb_status=self._without_trunk(found.limb_status)) if self._bows_low(state.pose) else found), now
 
     def _bows_low(self, pose: Array) -> bool:
@@ -112,7 +112,7 @@ class MonocularDoubt:
         components = {name: np.repeat(values[:, None], 3, axis=1) for name, values in found.items()}
         components["alternative"] = images.displacements(points)
         components["distance"] = points * (0, 0, DISTANCE)
-        if self.is_whole:
+        if self.tracker.picture.body.hem is None:
             components |= self._of_whole(state.pose, points, without(mask, state.unexplained))
         unseen = {limb: max(hidden, cut) for limb, (hidden, _, _, cut) in shares.items()}
         since = before.since if still and before is not None else seconds
@@ -120,34 +120,25 @@ class MonocularDoubt:
         return evidence, Before(mask, still, since)
 
     def _of_whole(self, pose: Array, points: Array, mask: Mask) -> dict[str, Array]:
-        """Components (L, 3) of a whole body with landmarks `points` (L, 3): their depths from the pelvis, twice, by which they would move
-        if the person faced the other way; the distances from the other side's joints; and those of the pelvis from where it would be if the
-        person stood upright in a mask (H, W), by stature and by the floor, or metres where the mask does not show that."""
-        tracker, root = self.tracker, points[self.names.index("pelvis")]
-        upright, found = tracker.upright(pose), dict[str, Array]()
-        found["mirrored"] = 2 * np.abs(points - root) * (0, 0, 1)
-        found["swapped"] = np.abs(points - points[self._counterparts])
-        for name, floor in (("stature", None), ("floor", tracker.floor)):
-            stands = standing_place(tracker.picture, mask, floor, upright) if name == "stature" or floor is not None else None
-            there = None if stands is None else tracker.picture.points(stands[None])[0][self.names.index("pelvis")]
-            found[name] = np.broadcast_to(np.zeros(3) if there is None else np.abs(there - root), points.shape)
-            found[f"no_{name}"] = np.broadcast_to(np.array([0, 0, 1.0]) * (there is None), points.shape)
-        return found
+        """Components (L, 3) of a whole body with landmarks `points` (L, 3): their distances from the other side's joints; and those of the
+        pelvis from where it would be if the person stood upright in a mask (H, W), by stature and by the floor, or a metre of depth where
+        the mask does not show their stature."""
+        tracker, pelvis = self.tracker, self.names.index("pelvis")
+
+        def off(floor: float | None) -> Array | None:
+            stands = standing_place(tracker.picture, mask, floor, tracker.upright(pose))
+            return None if stands is None else np.abs(tracker.picture.points(stands[None])[0, pelvis] - points[pelvis])
+
+        nowhere, stature, floor = np.zeros(3), off(None), None if tracker.floor is None else off(tracker.floor)
+        depth = np.array([0.0, 0, 1]) if stature is None else nowhere
+        found = {"stature": nowhere if stature is None else stature, "no_stature": depth, "floor": nowhere if floor is None else floor}
+        return {"swapped": np.abs(points - points[self._counterparts]),
+                **{name: np.broadcast_to(length, points.shape) for name, length in found.items()}}
 
     @cached_property
     def _counterparts(self) -> list[int]:
         """Of each landmark the other side's; its own without."""
         return other_side(self.names)
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether the body has legs."""
-        return self.tracker.picture.body.hem is None
-
-    @property
-    def kind(self) -> str:
-        """Which calibrated model the body has."""
-        return "monocular_whole" if self.is_whole else "monocular"
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -17,8 +17,6 @@ from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of
 
 TABLE = "factors.toml"
 """The factors, as `benchmarks/calibrate_doubt.py` writes them."""
-LIKE = {"hip": "shoulder", "knee": "elbow", "ankle": "hand", "sole": "hand"}
-"""Groups of the arms whose factors the legs' have where none are calibrated: one camera is calibrated on upper bodies."""
 Components = Mapping[str, Array]
 """Lengths (L, 3), metres, by name: of each joint along each of three axes."""
 
@@ -79,11 +77,11 @@ def without_side(name: str) -> str:
 
 @cache
 def variance_model(kind: str) -> VarianceModel:
-    """A calibrated model: of `monocular` tracking, or one that `doubt.multiview.kind_of` names."""
+    """A calibrated model: one that `doubt.mirror.kind_before_one` or `doubt.multiview.kind_of` names."""
     table = tomllib.loads(resources.files("shadowpuppet.tracking.doubt").joinpath(TABLE).read_text("utf-8"))[kind]
-    own = [table[group if group in table else LIKE[group]] for group in GROUPS]
-    factors = np.array([[group[axis] for axis in "xyz"] for group in own], float)
-    return VarianceModel(tuple(table["components"]), tuple(GROUPS), factors, {"leg": table["limits"]["arm"], **table["limits"]},
+    groups = tuple(group for group in GROUPS if group in table)
+    factors = np.array([[table[group][axis] for axis in "xyz"] for group in groups], float)
+    return VarianceModel(tuple(table["components"]), groups, factors, table["limits"],
                          table.get("dofs", {}), ModeWeights(**table["modes"]) if "modes" in table else None)
 
 
