@@ -14,6 +14,7 @@ from shadowpuppet.body.models import MODELS, average_body
 from shadowpuppet.motion.limbs import LIMBS, limb_of, limbs_of
 from shadowpuppet.tracking.doubt.doubt import UNSEEN, Evidence, limb_statuses, pose_deviations
 from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of, lever_of, limb_of_part
+from shadowpuppet.tracking.doubt.mirror import kind_before_one
 from shadowpuppet.tracking.doubt.steps import STILL_ALLOWED, Trail, stillness, surprise
 from shadowpuppet.tracking.doubt.variance import ModeWeights, VarianceModel, turned, variance_model
 
@@ -36,19 +37,23 @@ def test_shoulders_move_with_the_trunk():
     assert {part for part in average_body("anatomical").parts if limb_of_part(part) == "trunk"} == trunk
 
 
-def test_soles_have_factors_of_their_own_with_several_cameras_and_hands_factors_with_one():
-    """Smoothed ankles are nearer to the truth than heels and toes, which made the ankles' intervals too wide."""
-    several, one = (variance_model(kind).factors for kind in ("multiview", "monocular"))
+@pytest.mark.parametrize("kind", ["multiview", "monocular_whole"])
+def test_soles_have_factors_of_their_own(kind):
+    factors = variance_model(kind).factors
     ankle, sole, hand = (list(GROUPS).index(group_of(joint)) for joint in ("left_ankle", "left_toe", "left_hand"))
-    assert not np.array_equal(several[ankle], several[sole])
-    assert np.array_equal(one[sole], one[hand])
+    assert not np.array_equal(factors[ankle], factors[sole])
+    assert not np.array_equal(factors[hand], factors[sole])
 
 
-@pytest.mark.parametrize("kind", ["monocular", "multiview"])
+def test_an_upper_body_has_no_factors_of_legs():
+    assert variance_model("monocular").groups == ("pelvis", "neck", "shoulder", "elbow", "hand")
+
+
+@pytest.mark.parametrize("kind", ["monocular", "monocular_whole", "multiview"])
 def test_the_calibrated_factors_are_whole(kind):
     model = variance_model(kind)
-    bodies = [average_body(name) for name in MODELS if (kind == "monocular" and name in people.BODIES) or (kind == "multiview"
-              and name not in people.BODIES)]
+    bodies = [average_body(name) for name in MODELS if (name in people.BODIES) == (kind == "monocular")]
+    assert kind == "multiview" or {kind_before_one(body) for body in bodies} == {kind}
     assert {group_of(joint) for body in bodies for joint in body.landmark_names} <= set(model.groups)
     assert model.factors.shape == (len(model.groups), 3, len(model.names))
     assert (model.factors >= 0).all()
