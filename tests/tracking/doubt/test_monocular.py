@@ -7,11 +7,14 @@ from functools import cache
 import numpy as np
 import people
 import pytest
+from legs import over_floor, wide
 
+from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.tracking.doubt.mirror import Mirrors, _weights
 from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
 from shadowpuppet.tracking.doubt.variance import variance_model
 from shadowpuppet.tracking.monocular.settings import make_settings
+from shadowpuppet.tracking.monocular.standing_place import lowest
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 from shadowpuppet.tracking.silhouette_cost import Observation
 
@@ -167,3 +170,58 @@ def test_the_spread_is_that_of_the_particles_where_they_are_equally_good():
     found = MonocularDoubt(tracker())._spread(begun._replace(particles=tuple(particles)), points)
     assert abs(moved[LEFT_HAND]).max() > 0.1
     np.testing.assert_allclose(found, abs(moved) * np.sqrt(0.5), atol=2e-3)
+
+
+# A whole body
+
+
+@pytest.fixture(scope="module")
+def stands():
+    """A tracker of a whole person over a floor, and an upright pose on it."""
+    view = wide(over_floor("anatomical"))
+    assert view.floor is not None
+    pose = view.body.skeleton.pose()
+    pose[view.body.skeleton.dof_indices(["root_z"])] = view.floor - lowest(view)
+    return MonocularTracker(view, make_settings(overrides={"body": "anatomical"})), pose
+
+
+def evidence(tracker: MonocularTracker, pose: np.ndarray, mask: np.ndarray):
+    """The components of a whole body's doubt by which its place is judged, of the pelvis, by name."""
+    state = tracker.start(np.random.default_rng(0), mask)._replace(pose=pose)
+    found, _ = MonocularDoubt(tracker).evidence(state, mask, 0.0, None)
+    at = tracker.picture.body.landmark_names.index("pelvis")
+    return {name: found.components[name][at] for name in ("stature", "no_stature", "floor")}
+
+
+def test_who_stands_where_stature_and_floor_say_is_sure_and_who_is_elsewhere_is_not(stands):
+    tracker, pose = stands
+    mask = tracker.picture.mask(pose)
+    right = evidence(tracker, pose, mask)
+    assert right["stature"][2] < 0.1
+    assert right["floor"][2] < 0.1
+    assert not right["no_stature"].any()
+    moved = pose.copy()
+    moved[tracker.picture.body.skeleton.dof_indices(["root_x"])] -= 0.5
+    off = evidence(tracker, moved, mask)
+    assert off["stature"][2] == pytest.approx(0.5, abs=0.1)
+    assert off["floor"][2] == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_silhouette_that_the_picture_cuts_off_shows_no_stature(stands):
+    tracker, pose = stands
+    mask = tracker.picture.mask(pose)
+    mask[-1, np.flatnonzero(mask.any(0))[0]] = True
+    found = evidence(tracker, pose, mask)
+    assert found["no_stature"].tolist() == [0, 0, 1]
+    assert not found["stature"].any()
+
+
+def test_legs_have_the_calibrated_limits_and_crossing_limbs_are_doubted(stands):
+    tracker, pose = stands
+    state = tracker.start(np.random.default_rng(0), tracker.picture.mask(pose))._replace(pose=pose)
+    doubt = MonocularDoubt(tracker)
+    found, _ = doubt(state, tracker.picture.mask(pose), 0.0, None)
+    assert len(found.limb_status) == len(limbs_of(doubt.names)) == 5
+    components = doubt.evidence(state, tracker.picture.mask(pose), 0.0, None)[0].components
+    ankles = [doubt.names.index(f"{side}_ankle") for side in ("left", "right")]
+    np.testing.assert_allclose(components["swapped"][ankles[0]], np.abs(np.diff(tracker.picture.points(pose[None])[0, ankles], axis=0))[0])
