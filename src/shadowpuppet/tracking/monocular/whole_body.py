@@ -14,9 +14,10 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular.ground import calibrated_ground, moved_to, shown_ground
 from shadowpuppet.tracking.monocular.pose_search import search_pose
+from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.standing_place import PLACE, lowest, standing_place
-from shadowpuppet.tracking.monocular.whole_distance import whole_distance, whole_poses
+from shadowpuppet.tracking.monocular.tracker import MonocularTracker
 from shadowpuppet.tracking.silhouette_cost import Observation
 
 AGREE = 0.25
@@ -37,16 +38,22 @@ SearchPoses = Callable[[Camera, Sequence[Mask], str, PersonEstimate], Array]
 
 
 def _coarse_poses(camera: Camera, masks: Sequence[Mask], body: str, estimate: PersonEstimate) -> Array:
-    """Coarse poses (K, D) in masks (H, W); in place of `whole_poses` where there are many estimates."""
+    """Coarse poses (K, D) in masks (H, W); in place of `_whole_poses` where there are many estimates."""
     picture = estimate.picture(camera, body)
     return np.array([search_pose(picture, mask).pose for mask in masks])
+
+
+def _whole_poses(camera: Camera, masks: Sequence[Mask], body: str, estimate: PersonEstimate) -> Array:
+    """Whole poses (K, D) searched for in masks (H, W), each by itself."""
+    tracker = MonocularTracker(estimate.picture(camera, body), MonocularSettings(body=body), moves=False)
+    return np.array([tracker.start(np.random.default_rng(k), mask).pose for k, mask in enumerate(masks)])
 
 
 def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEstimate, body: str, sizes: BoneSizes | None = None,
                         distance: float | None = None, standing: bool = True) -> PersonEstimate:
     """The whole-body estimate for an upper-body one, with the neck at the same place, from masks (H, W) of a person facing the camera. The
-    distance (m), if not given, comes from the floor, or from the stature of a person known to be `standing`, or else from whole poses
-    (`whole_distance`): trunk and arms alone determine it worse, as clothes can make them wide. Given sizes are kept."""
+    distance (m), if not given, comes from the floor, or from the stature of a person known to be `standing`, or else is the upper body's.
+    Given sizes are kept."""
     found = upper.sizes
     assert isinstance(found, CardboxSizes)
     whole: BoneSizes = sizes or whole_from_upper(body, found, upper.height)
@@ -60,13 +67,10 @@ def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEsti
     if distance is None:
         stands = _on_ground(camera, masks, estimate, body)
         stands = _standing(camera, masks, estimate, body) if stands is None and standing else stands
-        if stands is None and not standing:
-            factor = whole_distance(camera, masks, body, lambda factor: dressed(_at_distance(estimate, factor, neck)))
-            stands = _at_distance(estimate, factor, neck)
         estimate = stands or estimate
     estimate = dressed(estimate)
     for _ in range(0 if standing else REFITS):  # straight legs in place of bent ones would make them too thin
-        estimate = dressed(estimate, whole_poses)
+        estimate = dressed(estimate, _whole_poses)
     return estimate
 
 
@@ -101,11 +105,6 @@ def _places(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, bod
     dofs, upright = picture.body.skeleton.dof_indices(PLACE), np.zeros(len(picture.body.skeleton.dofs))
     found = [pose[dofs] for mask in masks if (pose := standing_place(picture, mask, picture.floor, upright)) is not None]
     return np.array(found).reshape(-1, len(PLACE))
-
-
-def _at_distance(estimate: PersonEstimate, factor: float, neck: float) -> PersonEstimate:
-    """The estimate at `factor` times the distance, with the neck (`neck` metres above the pelvis) at the same place in the picture."""
-    return replace(estimate, distance=factor * estimate.distance, elevation=factor * (estimate.elevation + neck) - neck)
 
 
 def _with_clothes(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, sizes: BoneSizes, body: str,
