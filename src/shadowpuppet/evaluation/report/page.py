@@ -29,7 +29,7 @@ from shadowpuppet.evaluation.report.sections import (
 from shadowpuppet.evaluation.summary_text import coverage_text
 from shadowpuppet.io.files.text import write_whole
 from shadowpuppet.io.motion.table import dof_unit
-from shadowpuppet.motion.limbs import doubtful_limbs
+from shadowpuppet.motion.limbs import doubtful_limbs, limbs_in_words
 
 
 def check_report(path: str | Path, folder: str | Path) -> None:
@@ -124,8 +124,8 @@ def _shot(of: Evaluation, each: ReportFrame, image: bytes) -> str:
     motion = of.run.motion
     note = [f"{each.time:.2f} s", f"frame {each.frame}", str(motion.status[each.frame])]
     note += [f"overlap {motion.overlap[each.frame]:.2f}"] if motion.overlap[each.frame] == motion.overlap[each.frame] else []
-    doubtful = [limb.replace("_", " ") for limb in doubtful_limbs(motion.joint_names, motion.limb_status[each.frame])]
-    note += [f"{' and '.join(doubtful)} doubtful"] if doubtful else []
+    doubtful = doubtful_limbs(motion.joint_names, motion.limb_status[each.frame])
+    note += [f"{limbs_in_words(doubtful)} doubtful"] if doubtful else []
     worst = ", ".join(f"{plain(name.replace('_', ' '))} {off:.0f}" for name, off in each.worst)
     error = f"<b>{each.error:.0f} mm</b> in the mean; farthest off: {worst}. " if each.error == each.error else ""
     data = base64.b64encode(image).decode()
