@@ -38,8 +38,11 @@ def calibrated_ground(camera: Camera) -> Ground | None:
 
 
 def shown_ground(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str) -> Ground | None:
-    """The floor on which a person of an estimated size stands in masks (H, W), most of them upright in at least a third; None if too few
-    show them from crown to soles. The vertical is that of the calibration, if there is one."""
+    """The floor on which a person of an estimated size stands in masks (H, W), upright in a third of them at least; None if too few show
+    them from crown to soles. The vertical is that of the calibration, if there is one.
+
+    Of all tilts and heights of the camera it is those that most masks agree with: a standing person's stature tells the distance, and so
+    how far below the camera the soles are, which is the same everywhere on the floor."""
     tilts = np.zeros(1) if camera.oriented else TILTS
     best, least = None, np.inf
     for tilt in tilts:
@@ -60,9 +63,9 @@ def _heights(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, bo
     """Heights (K,) of the camera over the soles of a person who stands upright in masks (H, W), metres; none of masks that do not show
     both ends."""
     picture = estimate.picture(camera, body)
-    (raised,) = picture.body.skeleton.dof_indices(PLACE[2:])
+    (raised,), soles = picture.body.skeleton.dof_indices(PLACE[2:]), estimate.elevation + lowest(picture)
     poses = [standing_place(picture, mask, None, np.zeros(len(picture.body.skeleton.dofs))) for mask in masks]
-    return np.array([-estimate.elevation - pose[raised] - lowest(picture) for pose in poses if pose is not None])
+    return np.array([-soles - pose[raised] for pose in poses if pose is not None])
 
 
 def moved_to(camera: Camera, estimate: PersonEstimate, ground: Ground) -> PersonEstimate:

@@ -31,7 +31,6 @@ CONTACT_WEIGHT, REACH = 20000.0, 0.15
 """Cost of both feet off the floor, in the same unit; and the distance (m) from which it grows in proportion only."""
 SOLES_REACH = 4.5
 """Distance (pixels at 320 x 240) of the soles from the silhouette's last row at which its cost no longer grows much."""
-
 CUT_OFF = 2.0
 """How much farther below the end of a silhouette soles may be that the picture cuts off."""
 

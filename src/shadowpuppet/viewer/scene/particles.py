@@ -87,7 +87,8 @@ class ParticleRerun:
     @cached_property
     def _tracker(self) -> MonocularTracker:
         camera = self.cameras[0].camera
-        return MonocularTracker(Picture(self.body, camera, camera.T_camera_world @ self.root), self.options.tracker)
+        floor = -float(self.root[2, 3]) if camera.oriented else None
+        return MonocularTracker(Picture(self.body, camera, camera.T_camera_world @ self.root, floor), self.options.tracker)
 
     @cached_property
     def _rig_tracker(self) -> MultiviewTracker:
