@@ -82,7 +82,7 @@ class Agreement:
         for name in self.wrong:
             yield Finding.of("camera {camera!r} disagrees with the others by {pixels:.0f} pixels, they with each other by {others:.1f}: "
                              "was it moved, or is the calibration another's? calibrate it again, or leave it out: --camera {rest}",
-                             "camera {camera!r} disagrees: leave it out, or calibrate again", HARMFUL, camera=name,
+                             "camera {camera!r} disagrees: calibrate again, or --camera {rest}", HARMFUL, camera=name,
                              pixels=self.apart[self.names.index(name)] or 0.0, others=good, rest=",".join(rest))
 
 
