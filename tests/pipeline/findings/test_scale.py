@@ -8,6 +8,7 @@ import pytest
 import rendered
 
 from shadowpuppet.errors import RUINOUS
+from shadowpuppet.geometry import unit
 from shadowpuppet.io.calibration.calibration_files import read_calibration
 from shadowpuppet.pipeline.findings import scale
 from shadowpuppet.pipeline.findings.scale import ScaleError, _whole, judged, scale_error, stands
@@ -89,6 +90,17 @@ def test_who_is_cut_off_at_the_border_tells_no_height():
     cameras, masks = rendered.person(1.75)
     cut = [tuple(np.roll(each, each.shape[0] // 2, 0) for each in row) for row in masks]
     assert scale.moments_of(cameras, cut, MultiviewSettings()) == []
+
+
+def test_views_from_about_the_same_or_the_opposite_side_tell_no_scale():
+    cameras, masks = rendered.person(1.75)
+    middle = np.mean([camera.centre for camera in cameras], axis=0)
+    rays = unit(np.array([camera.centre for camera in cameras]) - middle)
+    for n in range(1, len(cameras)):
+        two = [tuple(each if k in (0, n) else None for k, each in enumerate(row)) for row in masks]
+        crosses = abs(float(rays[0] @ rays[n])) < np.cos(np.radians(45))
+        assert bool(scale.moments_of(cameras, two, MultiviewSettings())) == crosses
+    assert 0 < sum(abs(float(rays[0] @ ray)) < np.cos(np.radians(45)) for ray in rays[1:]) < len(cameras) - 1
 
 
 @pytest.fixture
