@@ -219,10 +219,10 @@ def tiny(film: Film) -> Film:
     return film._replace(spec=replace(film.spec, cameras=views, rate=5, scene=replace(film.spec.scene, empty_seconds=1)))
 
 
-def chosen(text: str, small: bool) -> Iterator[Film]:
-    """The films named, with ; between them; all without."""
+def chosen(text: str, small: bool, films: Sequence[Film]) -> Iterator[Film]:
+    """Those of the films that are named, with ; between them; all without."""
     wanted = [name.strip() for name in text.split(";") if name.strip()]
-    known = {film.name: film for film in films()}
+    known = {film.name: film for film in films}
     if unknown := next((name for name in wanted if name not in known), None):
         raise SystemExit(f"films: found {unknown!r}; there are: {'; '.join(known)}")
     for name in wanted or known:
@@ -249,7 +249,7 @@ def main() -> None:
     before = {} if args.against is None else {name: Figures(**values) for name, values in json.loads(args.against.read_text()).items()}
     found, lines = dict[str, Figures](), [HEAD]
     print(HEAD)
-    for film in chosen(args.films, args.small):
+    for film in chosen(args.films, args.small, films()):
         out = None if args.runs is None else args.runs / film.spec.name
         found[film.name] = measured(film, args.folder, out, args.overlay)
         lines.append(found[film.name].line(film.name, before.get(film.name)))

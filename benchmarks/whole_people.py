@@ -13,7 +13,7 @@ import argparse
 import json
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -165,16 +165,6 @@ def _mean(figures: Sequence[Figures]) -> Figures:
     return Figures(*np.nanmean(np.array(figures), axis=0).tolist())
 
 
-def chosen(text: str, small: bool, shift: int) -> Iterator[postures.Film]:
-    """The films named, with ; between them; all without."""
-    wanted = [name.strip() for name in text.split(";") if name.strip()]
-    known = {film.name: film for film in films(shift)}
-    if unknown := next((name for name in wanted if name not in known), None):
-        raise SystemExit(f"films: found {unknown!r}; there are: {'; '.join(known)}")
-    for name in wanted or known:
-        yield postures.tiny(known[name]) if small else known[name]
-
-
 def _smallest(folder: Path) -> list[object]:
     page = smallest.copy(HERE.parents[1] / "docs" / "accuracy.md", folder)
     return ["--films", "box", "--small", "--folder", folder, "--markdown", page, "--json", folder / "figures.json"]
@@ -196,7 +186,7 @@ def main() -> None:
     before = {} if args.against is None else {name: Figures(**values) for name, values in json.loads(args.against.read_text()).items()}
     found, lines = dict[str, Figures](), [HEAD]
     print(HEAD)
-    for film in chosen(args.films, args.small, args.shift):
+    for film in postures.chosen(args.films, args.small, films(args.shift)):
         found[film.name] = measured(film, args.folder, args.body, None if args.runs is None else args.runs / film.spec.name)
         lines.append(found[film.name].line(film.name, before.get(film.name)))
         print(lines[-1], flush=True)

@@ -14,9 +14,8 @@ from shadowpuppet.body.models import MODELS, average_body
 from shadowpuppet.motion.limbs import LIMBS, limb_of, limbs_of
 from shadowpuppet.tracking.doubt.doubt import UNSEEN, Evidence, limb_statuses, pose_deviations
 from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of, lever_of, limb_of_part
-from shadowpuppet.tracking.doubt.mirror import kind_before_one
 from shadowpuppet.tracking.doubt.steps import STILL_ALLOWED, Trail, stillness, surprise
-from shadowpuppet.tracking.doubt.variance import ModeWeights, VarianceModel, turned, variance_model
+from shadowpuppet.tracking.doubt.variance import ModeWeights, VarianceModel, kind_before_one, turned, variance_model
 
 JOINTS = ("neck", "left_shoulder", "left_elbow", "left_hand", "right_knee")
 LIMITS = {"trunk": 0.3, "arm": 0.2, "leg": 0.3}

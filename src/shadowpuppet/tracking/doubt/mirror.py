@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.segments import dofs_of
-from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import limb_of
 from shadowpuppet.motion.motion import Mode
 from shadowpuppet.tracking.doubt.doubt import STEP
-from shadowpuppet.tracking.doubt.variance import variance_model
+from shadowpuppet.tracking.doubt.variance import kind_before_one, variance_model
 from shadowpuppet.tracking.monocular.settings import pixel_scale
 from shadowpuppet.tracking.silhouette_cost import Observation
 
@@ -124,11 +123,6 @@ def _mirrored(chains: Array) -> Array:
     turned = bones - 2 * (bones * views).sum(2, keepdims=True) * views
     chosen = np.where(np.array(FLIPS)[None, :, :, None] < 0, turned[:, None], bones[:, None])
     return (chains[:, None, :1] + np.cumsum(chosen, axis=2)).reshape(len(chains), len(FLIPS), 6)
-
-
-def kind_before_one(body: Body) -> str:
-    """The calibrated model of a body before one camera."""
-    return "monocular_whole" if body.hem is None else "monocular"
 
 
 def _weights(ends: Array, images: Array, more: Array, kind: str = "monocular") -> dict[int, float]:

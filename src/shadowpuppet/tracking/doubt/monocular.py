@@ -18,8 +18,9 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import LIMBS, joints_of_limbs, limb_of
 from shadowpuppet.tracking.doubt.doubt import Doubt, Evidence, state_doubt
 from shadowpuppet.tracking.doubt.limbs import levers_of, limb_of_part
-from shadowpuppet.tracking.doubt.mirror import Mirrors, kind_before_one
+from shadowpuppet.tracking.doubt.mirror import Mirrors
 from shadowpuppet.tracking.doubt.steps import CONSTANT, DISTANCE, stillness
+from shadowpuppet.tracking.doubt.variance import kind_before_one
 from shadowpuppet.tracking.frozen import is_frozen, same_silhouette
 from shadowpuppet.tracking.monocular.standing_place import standing_place
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State

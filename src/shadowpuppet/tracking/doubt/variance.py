@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.doubt.limbs import GROUPS, group_of
@@ -75,9 +76,14 @@ def without_side(name: str) -> str:
     return rest if side in SIDES else name
 
 
+def kind_before_one(body: Body) -> str:
+    """The calibrated model of a body before one camera."""
+    return "monocular_whole" if body.hem is None else "monocular"
+
+
 @cache
 def variance_model(kind: str) -> VarianceModel:
-    """A calibrated model: one that `doubt.mirror.kind_before_one` or `doubt.multiview.kind_of` names."""
+    """A calibrated model: one that `kind_before_one` or `doubt.multiview.kind_of` names."""
     table = tomllib.loads(resources.files("shadowpuppet.tracking.doubt").joinpath(TABLE).read_text("utf-8"))[kind]
     groups = tuple(group for group in GROUPS if group in table)
     factors = np.array([[table[group][axis] for axis in "xyz"] for group in groups], float)

@@ -13,7 +13,7 @@ import numpy as np
 
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.camera.rasterize import place
+from shadowpuppet.camera.rasterize import Picture, place
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular.size_search import Ground, PersonEstimate
 from shadowpuppet.tracking.monocular.standing_place import PLACE, lowest, standing_place
@@ -44,10 +44,12 @@ def shown_ground(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate
     Of all tilts and heights of the camera it is those that most masks agree with: a standing person's stature tells the distance, and so
     how far below the camera the soles are, which is the same everywhere on the floor."""
     tilts = np.zeros(1) if camera.oriented else TILTS
-    best, least = None, np.inf
+    view, best, least = estimate.picture(camera, body), None, np.inf
+    soles = lowest(view)
     for tilt in tilts:
         up = camera.T_camera_world[:3, 2] if camera.oriented else np.array([0.0, -np.cos(tilt), -np.sin(tilt)])
-        heights = _heights(camera, masks, moved_to(camera, estimate, Ground(up, 0.0)), body)
+        there = moved_to(camera, estimate, Ground(up, 0.0))
+        heights = -there.elevation - soles - _raised(replace(view, T_camera_base=place(camera, there.distance, there.elevation, up)), masks)
         eyes = heights[heights > 0]
         if len(heights) < FEWEST or not len(eyes):
             continue
@@ -59,13 +61,11 @@ def shown_ground(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate
     return best
 
 
-def _heights(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str) -> Array:
-    """Heights (K,) of the camera over the soles of a person who stands upright in masks (H, W), metres; none of masks that do not show
-    both ends."""
-    picture = estimate.picture(camera, body)
-    (raised,), soles = picture.body.skeleton.dof_indices(PLACE[2:]), estimate.elevation + lowest(picture)
-    poses = [standing_place(picture, mask, None, np.zeros(len(picture.body.skeleton.dofs))) for mask in masks]
-    return np.array([-soles - pose[raised] for pose in poses if pose is not None])
+def _raised(picture: Picture, masks: Sequence[Mask]) -> Array:
+    """How far (K,) a person is raised who stands upright in masks (H, W), metres; none of masks that do not show both ends."""
+    (up,), upright = picture.body.skeleton.dof_indices(PLACE[2:]), np.zeros(len(picture.body.skeleton.dofs))
+    poses = [standing_place(picture, mask, None, upright) for mask in masks]
+    return np.array([pose[up] for pose in poses if pose is not None])
 
 
 def moved_to(camera: Camera, estimate: PersonEstimate, ground: Ground) -> PersonEstimate:

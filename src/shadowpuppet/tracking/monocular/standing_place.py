@@ -37,8 +37,8 @@ def standing_place(picture: Picture, mask: Mask, floor: float | None, upright: A
     Where the crown is lower than that of a person who stands there, the pose is lowered, its straight legs below the floor.
     """
     skeleton = picture.body.skeleton
-    soles = soles_row(mask)
-    if PLACE[0] not in skeleton.dof_names or soles is None or (soles.cut and not farthest):
+    end = soles_row(mask)
+    if PLACE[0] not in skeleton.dof_names or end is None or (end.cut and not farthest):
         return None
     place, pose = skeleton.dof_indices(PLACE), upright.copy()
     pose[place] = 0.0

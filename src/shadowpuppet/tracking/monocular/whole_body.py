@@ -11,6 +11,7 @@ from shadowpuppet.body.models import make_body, whole_from_upper
 from shadowpuppet.body.sizes import BoneSizes, CardboxSizes
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
+from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.monocular.ground import calibrated_ground, moved_to, shown_ground
 from shadowpuppet.tracking.monocular.pose_search import search_pose
@@ -66,7 +67,8 @@ def whole_from_estimate(camera: Camera, masks: Sequence[Mask], upper: PersonEsti
 
     if distance is None:
         stands = _on_ground(camera, masks, estimate, body)
-        stands = _standing(camera, masks, estimate, body) if stands is None and standing else stands
+        if stands is None and standing:
+            stands = _standing(estimate, estimate.picture(camera, body), masks)
         estimate = stands or estimate
     estimate = dressed(estimate)
     for _ in range(0 if standing else REFITS):  # straight legs in place of bent ones would make them too thin
@@ -82,26 +84,29 @@ def _on_ground(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, 
     for ground in (known, shown):
         if ground is not None:
             there = moved_to(camera, estimate, ground)
-            off = np.log(np.maximum(there.distance - _places(camera, masks, there, body)[:, 0], 1e-3) / there.distance)
+            picture = there.picture(camera, body)
+            places = _places(picture, masks)
+            off = np.log(np.maximum(there.distance - places[:, 0], 1e-3) / there.distance)
             if len(off) and (same or (off.min() <= AGREE and (ground is shown or off.max() >= -AGREE))):
-                return _standing(camera, masks, there, body)
+                return _at_median(there, picture, places)
     return None
 
 
-def _standing(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str) -> PersonEstimate | None:
-    """The estimate at the median of its places in masks (H, W), standing on the floor if that is known; None if they show none."""
-    places = _places(camera, masks, estimate, body)
-    if not len(places):
-        return None
+def _standing(estimate: PersonEstimate, picture: Picture, masks: Sequence[Mask]) -> PersonEstimate | None:
+    """The estimate, seen as in a picture, at the median of its places in masks (H, W); None if they show none."""
+    places = _places(picture, masks)
+    return _at_median(estimate, picture, places) if len(places) else None
+
+
+def _at_median(estimate: PersonEstimate, picture: Picture, places: Array) -> PersonEstimate:
+    """The estimate, seen as in a picture, at the median of some places (K, 3), standing on the floor if that is known."""
     ahead, _, raised = np.median(places, axis=0).tolist()
-    picture = estimate.picture(camera, body)
     raised = raised if picture.floor is None else picture.floor - lowest(picture)  # a seated person is lower
     return replace(estimate, distance=estimate.distance - ahead, elevation=estimate.elevation + raised)
 
 
-def _places(camera: Camera, masks: Sequence[Mask], estimate: PersonEstimate, body: str) -> Array:
+def _places(picture: Picture, masks: Sequence[Mask]) -> Array:
     """The places (K, 3) at which the person, upright, on the floor if it is known, fits those of some masks (H, W) that show one."""
-    picture = estimate.picture(camera, body)
     dofs, upright = picture.body.skeleton.dof_indices(PLACE), np.zeros(len(picture.body.skeleton.dofs))
     found = [pose[dofs] for mask in masks if (pose := standing_place(picture, mask, picture.floor, upright)) is not None]
     return np.array(found).reshape(-1, len(PLACE))
