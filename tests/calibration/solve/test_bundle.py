@@ -8,8 +8,8 @@ import boards
 import numpy as np
 import pytest
 
-from shadowpuppet.calibration.solve.bundle import adjust, projected
-from shadowpuppet.calibration.solve.lens import MODELS, lens_advice, solve_lens
+from shadowpuppet.calibration.solve.bundle import Bundle, Free, adjust, projected
+from shadowpuppet.calibration.solve.lens import MODELS, lens_advice, observations, solve_lens
 from shadowpuppet.calibration.solve.placement import place_cameras
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.errors import CalibrationError
@@ -146,6 +146,17 @@ def test_a_lens_from_views_of_a_board():
     assert abs(fit.camera.matrix[1, 1] / camera.matrix[1, 1] - 1) < 0.003
     assert fit.rms < 0.2
     assert not lens_advice(fit)
+
+
+@pytest.mark.parametrize("distances", [(1.5, 1.5), (1.2, 1.8)])
+def test_a_focal_length_that_no_view_tells_is_unknown(distances):
+    camera, rng = replace(boards.ring(1)[0], T_camera_world=np.eye(4), distortion=np.array([1e-9] * 8)), np.random.default_rng(2)
+    poses = [rigid(np.eye(3), [*rng.uniform(-0.2, 0.2, 2), z]) for z in np.linspace(*distances, 8)]  # all of them square to it
+    views = [boards.view_of(camera, T, rng, noise=0.01) for T in poses]
+    seen = observations(boards.BOARD, [(0, b, view) for b, view in enumerate(views)])
+    solved = adjust(Bundle((camera,), np.array(poses), np.zeros(1)), seen, Free([False], [True] * 8, [False], [True]))
+    assert np.isfinite(solved.lens_sd[0])
+    assert solved.lens_sd[0] > 1
 
 
 @pytest.mark.whole

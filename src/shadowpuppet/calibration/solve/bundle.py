@@ -286,13 +286,18 @@ def _normal(jacobian: csr_array, residuals: Array, scale: float) -> tuple[csc_ar
 
 
 def _covariance(H: csc_array, columns: _Columns) -> Array:
-    """Covariance of the columns that are not boards', which are taken out (Schur's complement); infinite where the observations say
-    nothing."""
-    first = columns.shared
+    """Covariance of the columns that are not boards', which are taken out (Schur's complement); immense where the observations say
+    nothing. Eigenvalues below what rounding leaves, negative ones among them, count as that much: such directions are unknown, not sure.
+    """
+    first, rounding = columns.shared, columns.total * float(np.finfo(float).eps)
     S = H[:first, :first].toarray()
+    size = np.sqrt(S.diagonal())  # each column in units of its own, before the boards are taken out: rounding is relative to that
+    size[size == 0] = 1
     try:
         if first < columns.total:
             S = S - H[:first, first:] @ splu(H[first:, first:]).solve(H[first:, :first].toarray())
-        return np.asarray(np.linalg.pinv(S, hermitian=True), float)
+        values, vectors = np.linalg.eigh(S / np.outer(size, size))
     except (RuntimeError, np.linalg.LinAlgError):  # singular
-        return np.diag(np.full(first, np.inf))
+        return np.eye(first) / rounding
+    spread = vectors / size[:, None]
+    return np.asarray(spread / np.maximum(values, rounding) @ spread.T, float)
