@@ -211,7 +211,7 @@ def track_multiview(path: Path, kind: str = "multiview") -> Iterator[Tracked]:
     """A recording of several cameras with every fault, or each of `SIGHTINGS` if keypoints are evidence. Errors are those of the smoothed
     motion, which is what a run's deviations are stated of: the backward pass keeps feet on the floor."""
     late: Fault = lambda rng, masks, rate: [masks[max(n - LATE, 0)] for n in range(len(masks))]  # noqa: E731
-    if kind == "multiview":
+    if kind in ("multiview", "pair"):
         yield from tracked_with(path, make_options({"evidence": "silhouettes"}), FAULTS | {"late": late})
     for detector, cameras in SIGHTINGS.get(kind, ()):
         known = with_keypoints(path, detector)
@@ -289,7 +289,8 @@ def collect(kind: str, path: Path, build: Path, again: bool, clean: bool = False
     if path.parent == RINGS:
         make_ring(path)
     elif path.parent == WHOLE:
-        whole_people.made(next(film for film in whole_people.films() if film.spec.name == path.name), WHOLE)
+        films = (*whole_people.films(), *whole_people.pairs())
+        whole_people.made(next(film for film in films if film.spec.name == path.name), WHOLE)
     elif path.parent == POSTURES:
         postures.made(next(film for film in _whole() if film.spec.name == path.name), POSTURES)
     if again or not (folder / "done").exists():
@@ -313,10 +314,10 @@ def _whole() -> list[postures.Film]:
 
 
 TRACK = {"monocular": track_monocular, "monocular_whole": partial(track_monocular, kind="monocular_whole"),
-         "multiview": track_multiview, **{kind: partial(track_multiview, kind=kind) for kind in SIGHTINGS}}  # fmt: skip
+         **{kind: partial(track_multiview, kind=kind) for kind in ("multiview", "pair", *SIGHTINGS)}}  # fmt: skip
 MADE: dict[str, Callable[[], list[Path]]] = {
     "monocular": lambda: made_ground(GROUND), "monocular_whole": lambda: [WHOLE / film.spec.name for film in whole_people.films()],
-    **dict.fromkeys(("multiview", *SIGHTINGS), _rings),
+    **dict.fromkeys(("multiview", *SIGHTINGS), _rings), "pair": lambda: [WHOLE / film.spec.name for film in whole_people.pairs()],
     "keypoints_one": lambda: [*_rings(), *(POSTURES / film.spec.name for film in _whole())],
 }  # fmt: skip
 

@@ -1,10 +1,11 @@
-"""Whole people before one camera: made films of people who walk, turn, sit down, squat, kneel and stand, tracked with the whole body.
+"""Whole people before one camera or two: made films of people who walk, turn, sit down, squat, kneel and stand, tracked whole.
 
-    python benchmarks/whole_people.py [--films "walk across;squat"] [--body rounded] [--against FILE] [--json FILE]
+    python benchmarks/whole_people.py [--pairs] [--films "walk across;squat"] [--body rounded] [--against FILE] [--json FILE]
                                      [--markdown docs/accuracy.md]
 
-The films are made where they are missing, in build/whole_people. The camera's lens and the person's height are known; its place over the
-floor in every other film. `calibrate_doubt.py` chooses the factors of doubt of a whole body by them.
+The films are made where they are missing, in build/whole_people. One camera's lens and the person's height are known, the camera's place
+over the floor in every other film; `calibrate_doubt.py` chooses the factors of doubt of a whole body by them. With `--pairs` two calibrated
+cameras stand 60 to 120 degrees apart, and the height is known in every other film.
 """
 
 from __future__ import annotations
@@ -24,19 +25,19 @@ import smallest
 from faults import into_page
 from numpy.typing import NDArray
 
+from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.motion.limbs import joints_of_limbs, limb_of
 from shadowpuppet.motion.metrics import FAR_ERROR, joint_errors
-from shadowpuppet.motion.motion import Motion
+from shadowpuppet.motion.motion import JointTable, Motion
 from shadowpuppet.pipeline.options import make_options
-from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.synthetic import Gesture, Mannequin, Obstacle, Scene, Spec, Viewpoint
 from shadowpuppet.synthetic.movement.resting import PostureName
 from shadowpuppet.synthetic.person.mannequin import PersonKind
 
 HERE = Path(__file__).resolve().parent.parent / "build" / "whole_people"
-TABLE = "whole people"
+TABLES = ("whole people", "pairs")
 NEAR = 0.1
 """Error (m) below which a doubtful joint is a false alarm."""
 WALK, LINE, ROUND = Gesture(motion="walk", seconds=5.0), {"path": "line", "size": 2.2}, {"path": "circle", "size": 1.0}
@@ -76,6 +77,39 @@ FILMS: tuple[tuple[str, PersonKind, str, float, float, float, float], ...] = (
 )
 
 
+PAIRS: tuple[tuple[str, PersonKind, str, float, float, float, float], ...] = (
+    # name, kind of the body, motions, turn of the person, angle between the cameras (degrees), their distance and height (m)
+    ("walk toward", "man", "line", 0, 75, 4.2, 1.6),
+    ("walk toward, aslant", "woman", "line", 20, 60, 4.4, 1.4),
+    ("walk across", "man", "line", 90, 90, 4.8, 1.3),
+    ("circle", "woman", "round", 0, 100, 4.4, 1.6),
+    ("circle, child", "child", "round", 90, 70, 3.8, 1.2),
+    ("jog", "man", "jog", 40, 110, 4.4, 1.5),
+    ("reach", "woman", "reach+wave_hands", 0, 115, 3.8, 1.5),
+    ("box", "man", "box", 15, 65, 3.8, 1.4),
+    ("squat", "woman", "squat", -20, 80, 3.8, 1.7),
+    ("lift", "man", "lift", 30, 120, 4.0, 1.4),
+    ("turn around", "woman", "turn_around", 0, 95, 4.0, 1.5),
+    ("any motion", "child", "random_body", 10, 85, 3.6, 1.2),
+)
+
+
+def pairs(shift: int = 0) -> tuple[postures.Film, ...]:
+    """The films of two cameras, five seconds each; with a `shift` of other people, clothes and rooms."""
+    out = list[postures.Film]()
+    for n, (name, kind, motion, turn, apart, distance, height) in enumerate(PAIRS):
+        seed = 300 + n + shift
+        body = Mannequin.draw(np.random.default_rng(seed), kind)
+        pitch = float(np.degrees(np.arctan((height - 0.52 * body.stature) / distance)))
+        view = Viewpoint(distance=distance, height=height, fov_deg=52, pitch_deg=pitch)
+        cameras = tuple(replace(view, name=f"cam{k}", azimuth_deg=side * apart / 2) for k, side in enumerate((-1, 1), 1))
+        scene = Scene(clothing=seed, room=seed, empty_seconds=2.0, noise=(2.5, 4.0, 6.0)[n % 3])
+        spec = Spec(name="pair_" + re.sub(r"\W+", "_", name), body=body, motion=_motion(motion), scene=scene, cameras=cameras,
+                    turn_deg=turn, training=(), tells=("nothing", "height")[n % 2], seed=(24, seed))
+        out.append(postures.Film(name, spec))
+    return tuple(out)
+
+
 def films(shift: int = 0) -> tuple[postures.Film, ...]:
     """The films, five seconds each; with a `shift` of other people, clothes and rooms."""
     out = list[postures.Film]()
@@ -96,6 +130,8 @@ def films(shift: int = 0) -> tuple[postures.Film, ...]:
 def made(film: postures.Film, folder: Path) -> Path:
     """Folder of the recording; made if it is missing. Every other film's camera has no known place."""
     path = postures.made(film, folder)
+    if len(film.spec.cameras) > 1:
+        return path
     calibration = path / "calibration.toml"
     text = calibration.read_text("utf-8")
     if not is_placed(film) and "oriented" not in text:
@@ -122,6 +158,8 @@ class Figures(NamedTuple):
     """Share of the joints that are, and vouched for, per cent."""
     alarms: float
     """Share of the joints under 100 mm off whose limb is called doubtful, per cent."""
+    exchanged: float
+    """Share of the frames whose mean error is less by half with left and right exchanged, per cent."""
 
     def line(self, name: str, before: Figures | None = None) -> str:
         """The row as Markdown, with the figures `before` in brackets."""
@@ -133,7 +171,8 @@ class Figures(NamedTuple):
         return f"| {name} | " + " | ".join(map(cell, self._fields)) + " |"
 
 
-HEAD = "| film | arms and neck, mm | legs, mm | over 300 mm, % | and vouched for, % | under 100 mm, doubtful, % |\n|---|" + "---:|" * 5
+HEAD = ("| film | arms and neck, mm | legs, mm | over 300 mm, % | and vouched for, % | under 100 mm, doubtful, % | exchanged, % |\n"
+        "|---|" + "---:|" * 6)
 
 
 def measured(film: postures.Film, folder: Path, body: str | None, out: Path | None = None) -> Figures:
@@ -143,15 +182,24 @@ def measured(film: postures.Film, folder: Path, body: str | None, out: Path | No
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         motion = track_recording(path, out or path / "run", options).motion
-    errors = joint_errors(motion.table, truth, [name for name in motion.table.names if name in truth.names],
-                          camera=open_rig(path, options).cameras[0])
+    names = [name for name in motion.table.names if name in truth.names]
+    errors = joint_errors(motion.table, truth, names)
+    mirrored = JointTable(truth.times, tuple(map(_other, truth.names)), truth.positions)
+    exchanged = joint_errors(motion.table, mirrored, names).distance.mean(1) < errors.distance.mean(1) / 2
     leg = np.array([limb_of(name).endswith("leg") for name in errors.names])
     upper = ~leg & np.array([name not in ("pelvis", "head") for name in errors.names])
     doubtful = _doubtful(motion, errors.names)[: len(errors.distance)]
     far, near = errors.known & (errors.distance > FAR_ERROR), errors.known & (errors.distance < NEAR)
     means = [1000 * float(errors.distance[:, part][errors.known[:, part]].mean()) if part.any() else np.nan for part in (upper, leg)]
     return Figures(*means, *(100 * float(part.sum() / max(of.sum(), 1)) for part, of in
-                             ((far, errors.known), (far & ~doubtful, errors.known), (near & doubtful, near))))
+                             ((far, errors.known), (far & ~doubtful, errors.known), (near & doubtful, near))),
+                   100 * float(exchanged.mean()))
+
+
+def _other(name: str) -> str:
+    """The joint of the other side."""
+    side, _, joint = name.partition("_")
+    return f"{SIDES[1 - SIDES.index(side)]}_{joint}" if side in SIDES else name
 
 
 def _doubtful(motion: Motion, names: tuple[str, ...]) -> NDArray[np.bool_]:
@@ -174,6 +222,7 @@ def main() -> None:
     """Parse, run, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--films", default="", help="names, with ; between them; all without")
+    parser.add_argument("--pairs", action="store_true", help="the films of two cameras")
     parser.add_argument("--body", default="anatomical", help="body to track with; empty: the default")
     parser.add_argument("--shift", type=int, default=0, help="other people, clothes and rooms")
     parser.add_argument("--folder", type=Path, default=HERE, help="where the films are, or are made")
@@ -186,7 +235,7 @@ def main() -> None:
     before = {} if args.against is None else {name: Figures(**values) for name, values in json.loads(args.against.read_text()).items()}
     found, lines = dict[str, Figures](), [HEAD]
     print(HEAD)
-    for film in postures.chosen(args.films, args.small, films(args.shift)):
+    for film in postures.chosen(args.films, args.small, (pairs if args.pairs else films)(args.shift)):
         found[film.name] = measured(film, args.folder, args.body, None if args.runs is None else args.runs / film.spec.name)
         lines.append(found[film.name].line(film.name, before.get(film.name)))
         print(lines[-1], flush=True)
@@ -194,7 +243,7 @@ def main() -> None:
     lines.append(_mean(list(found.values())).line("mean", _mean(then) if then else None))
     print(lines[-1])
     if args.markdown is not None:
-        into_page(args.markdown, TABLE, "\n".join(lines))
+        into_page(args.markdown, TABLES[args.pairs], "\n".join(lines))
     if args.json is not None:
         args.json.write_text(json.dumps({name: each._asdict() for name, each in found.items()}, indent=1), encoding="utf-8")
 

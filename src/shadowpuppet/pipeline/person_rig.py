@@ -7,7 +7,7 @@ from collections.abc import Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -20,9 +20,10 @@ from shadowpuppet.camera.keypoints import Keypoints, cameras_with_persons
 from shadowpuppet.camera.mask import Mask, Seen, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import HARMFUL, NOTED, Finding, SettingsError, choices
+from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.motion_files import read_motion
 from shadowpuppet.io.person import Person, read_person
-from shadowpuppet.motion.motion import BLANK, JointTable, MotionFrame
+from shadowpuppet.motion.motion import BLANK, JointTable, Motion, MotionFrame
 from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.learn_prior import familiar
 from shadowpuppet.pipeline.options import Options
@@ -34,6 +35,7 @@ from shadowpuppet.tracking.arm_colours import ColourCounts
 from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.multiview import Before, MultiviewDoubt
 from shadowpuppet.tracking.doubt.steps import Trail
+from shadowpuppet.tracking.doubt.variance import variance_model
 from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.keypoints.stature import height_by_bones
 from shadowpuppet.tracking.multiview.bundle_adjustment import Deviations
@@ -50,6 +52,7 @@ from shadowpuppet.tracking.multiview.size_estimation import (
 from shadowpuppet.tracking.multiview.surface.visual_hull import NO_SURFACE, SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles
+from shadowpuppet.tracking.smoothing.likelier_pass import likelier
 from shadowpuppet.tracking.unexplained import Unexplained, left_out, looks_in
 from shadowpuppet.video import Image
 
@@ -80,6 +83,8 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
     """Whether the sizes are the person's own, not average ones."""
     front: Front | None = None
     """The front, if silhouettes hardly show it: the pose is first searched for about it."""
+    silhouettes_alone: bool = False
+    """Whether no keypoints tell the front."""
     state_types = (MultiviewState, Particles, Unexplained, ColourCounts, Before, Trail)
 
     def observe(self, seen: Seen) -> HullObservation:
@@ -121,6 +126,19 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
         if state is None or state.pose is None or state.status in BLANK:
             return ()
         return tuple(picture.draw(np.asarray(state.pose)) for picture in self.tracker.views.pictures)
+
+    @property
+    def both_ways(self) -> bool:
+        """Whether a film is tracked backward, too: two cameras', whose silhouettes allow several fronts."""
+        return self.silhouettes_alone and self.tracker.sees_quarters_alike
+
+    def turned_back(self, state: MultiviewState | None) -> Self:
+        """See `TrackedSubject`; the person is searched for in the last frame."""
+        return replace(self, front=None)
+
+    def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
+        """See `TrackedSubject`."""
+        return likelier(forward, backward, variance_model("pair").limits)
 
     def doubt(self, state: MultiviewState, observation: HullObservation, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
         """Doubt about the estimate of a frame set."""
@@ -183,7 +201,7 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
         scale = "the height" if height else f"an average height of {tall:.2f} m" if seen is None else f"a height of {tall:.2f} m as seen"
         source = f"{scale}, and the {shown} of the first seconds"
         assert isinstance(sizes, BoneSizes)
-        spread = Deviations(size_deviations(sizes, shown=False), None if height else shared_deviations(sizes))
+        spread = Deviations(size_deviations(sizes, shown=False), None if height else shared_deviations(sizes, len(cameras)))
         if len(cameras) == 1:  # which shows proportions only
             spread = Deviations(spread.alone, sums=known_stature(sizes))
     library, looks = known.poses if len(known.poses) else None, 0 if hull is None else looks_in(settings.patience, rate)
@@ -197,7 +215,7 @@ def fit_in_views(rng: np.random.Generator, cameras: Sequence[Camera], views: Seq
                                carve=hull.points if settings.odd_camera and hull is not None else None, rate=rate)
     return MultiviewSubject(body=person.body, person=Person(person.sizes, height, source), summary=summary, hull=hull, tracker=tracker,
                             doubts=(*_front_doubts(person.front), *(() if seen is None else _doubts(seen.height, person.overlap))),
-                            front=person.front,
+                            front=person.front, silhouettes_alone=not any(map(any, keypoints)),
                             beside=tuple(_beside(each, picture.mask(person.pose), camera.size)
                                          for each, picture, camera in zip(person.unexplained, tracker.views.pictures, cameras)))
 

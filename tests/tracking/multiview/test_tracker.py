@@ -205,7 +205,7 @@ def test_each_cycle_has_less_noise_than_the_last():
 
 
 @pytest.mark.parametrize(("cameras", "particles", "free_space"),
-                         [(3, 40, True), (4, 40, True), (5, 24, True), (6, 16, False), (7, 16, False)])
+                         [(1, 40, True), (2, 80, True), (3, 40, True), (4, 40, True), (5, 24, True), (6, 16, False), (7, 16, False)])
 def test_more_cameras_need_fewer_particles_and_from_six_on_no_free_space(cameras, particles, free_space, monkeypatch):
     views = (actor.cameras() * 2)[:cameras]
     of = MultiviewTracker(actor.body(), views, MultiviewSettings())

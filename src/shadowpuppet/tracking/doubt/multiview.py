@@ -77,7 +77,8 @@ class MultiviewDoubt:
         Of every joint there are: a constant; the particles' spread; of its limb, the surface near it that no part explains, the share
         outside a silhouette, the share without surface points, and the share that few cameras see, times the joint's lever, and the
         distance of the surface that its parts explain; how far the joint left its course; the misfit of the whole body; silhouettes that do
-        not change; and the distance to its counterpart on the other side, if they were close within the last second. Where keypoints show
+        not change; the distance to its counterpart on the other side, if they were close within the last second; and, with two cameras,
+        that to the upright axis through the pelvis, about which the body may be turned. Where keypoints show
         a limb, what silhouettes do not show of it counts less; and there are the components of `keypoint_view`, and the error of the
         person's distance from an only camera.
         """
@@ -102,6 +103,8 @@ class MultiviewDoubt:
             columns = dict(zip(("bare", "unexplained", "outside", "unseen"), by_joint[:4] * levers)) | {"residual": by_joint[4]}
             columns |= {"misfit": np.fmax(1 - state.overlap - GOOD_MISFIT, 0) * levers, "still": stillness(still) * levers}
             found |= _along_axes(columns) | {"swapped": np.abs(points - points[self.counterparts]) * (apart < CROSSING)[:, None]}
+            if self.tracker.sees_quarters_alike:
+                found["turned"] = self._beside_axis(points)
         now = Before(seconds, trail.with_frame(seconds, points), tuple(masks), still, apart)
         return Evidence(found, dict(zip(LIMBS, unseen.tolist()))), now
 
@@ -143,6 +146,11 @@ class MultiviewDoubt:
             _look_up(axis, limb, camera.T_camera_world, make_lens(camera), mask, seen, out)
         number = np.maximum(seen / np.maximum(np.bincount(limb, minlength=len(LIMBS)), 1), 0.25)
         return out / np.maximum(seen, 1), 1 / np.sqrt(number)
+
+    def _beside_axis(self, points: Array) -> Array:
+        """Distance of each joint (L, 3) from the upright axis through the pelvis, along both level axes (L, 3), metres."""
+        beside = np.linalg.norm((points - points[self.names.index("pelvis")])[:, :2], axis=1)
+        return beside[:, None] * np.array([1.0, 1.0, 0.0])
 
     def _apart(self, points: Array, seconds: float, before: Before | None) -> Array:
         """Least distance (L,) of each joint from its counterpart in about the last second."""
@@ -202,9 +210,12 @@ def _look_up(points, limbs, T, lens, mask, seen, out):  # pragma: no cover
 
 
 def kind_of(masks: Sequence[Mask | None], keypoints: KeypointEvidence | None) -> str:
-    """The calibrated model of doubt by what is seen: `multiview`, `keypoints`, `keypoints_one` of one camera, or `both`."""
-    if keypoints is None or any(mask is not None for mask in masks):
-        return "multiview" if keypoints is None else "both"
+    """The calibrated model of doubt by what is seen: `multiview`, `pair` of two cameras, `keypoints`, `keypoints_one` of one camera, or
+    `both`."""
+    if keypoints is None:
+        return "pair" if len(masks) == 2 else "multiview"
+    if any(mask is not None for mask in masks):
+        return "both"
     return "keypoints" if keypoints.cameras > 1 else "keypoints_one"
 
 

@@ -101,7 +101,7 @@ class MultiviewSettings:
     refinement: Literal["gauss_newton", "forces"] = "gauss_newton"
     """How poses are refined."""
     particles: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
-    """Number of particles, N. Default: 16 with six cameras or more, 24 with five, 40 with fewer, which show less and are faster to draw."""
+    """Number of particles, N. Default: 16 with six cameras or more, 24 with five, 40 with fewer, which show less, and 80 with two."""
     resampling: Literal["stratified", "systematic", "multinomial", "residual"] = "systematic"
     """How particles are selected by their weights."""
     select_best: bool = True

@@ -61,7 +61,7 @@ EMPTINESS_SHARE = 0.25
 """Weight of limbs that reach out of the silhouettes while sizes are solved for, over that of the tracker: bones must neither grow into
 empty space nor shrink where a chair hides them."""
 ALIKE = 1.2
-"""Cost of the best pose that faces the other way, over that of a pose, up to which the front is doubted and both are measured."""
+"""Cost of the best pose that faces another way, over that of a pose, up to which the front is doubted and both are measured."""
 SAME_FRAME = 0.01
 """Distance (m) of the means of two frames' surface points below which they are taken for the same frame's."""
 MIN_FRAMES = 4
@@ -69,14 +69,14 @@ MIN_FRAMES = 4
 
 
 class Front(NamedTuple):
-    """The front of a person whose silhouettes hardly distinguish front and back."""
+    """The front of a person whose silhouettes hardly show it."""
 
     heading: float
     """In the first frame in which the person was found, rad."""
     middle: Array
     """Mean of that frame's surface points (3,), world."""
     lead: float
-    """Mean cost of a body that faces the other way, with sizes that suit it, over that of the estimate, less 1."""
+    """Mean cost of the best body that faces another way, with sizes that suit it, over that of the estimate, less 1."""
 
     def heading_in(self, surface: SurfacePoints) -> float | None:
         """The heading, rad, if these are that frame's surface points; None of others."""
@@ -105,7 +105,7 @@ class SizeEstimate(Generic[Measured]):
     unexplained: tuple[Unexplained | None, ...] = ()
     """What the silhouettes have beside the body, by camera."""
     front: Front | None = None
-    """The front, if a body that faces the other way fits nearly as well."""
+    """The front, if a body that faces another way fits nearly as well."""
 
 
 def size_deviations(sizes: BoneSizes, shown: bool) -> Array:
@@ -118,12 +118,13 @@ def size_deviations(sizes: BoneSizes, shown: bool) -> Array:
     return np.array([smaller, larger])
 
 
-def shared_deviations(sizes: BoneSizes) -> Array:
-    """Deviations (2, K), metres, that sizes have together about those of an estimated height, as in `solve_bundle`: stature, and girth.
-    With a known height neither: few cameras' hulls are too wide, and girths would grow with them until arms vanish in the trunk."""
+def shared_deviations(sizes: BoneSizes, cameras: int) -> Array:
+    """Deviations (1 or 2, K), metres, that sizes have together about those of an estimated height, as in `solve_bundle`: stature, and with
+    three cameras or more girth. With a known height neither: few cameras' hulls are too wide, and girths would grow with them until arms
+    vanish in the trunk."""
     values = sizes.to_array()
     girth = GIRTH_DEVIATION * np.where(_is_width(type(sizes)), values, 0.0)
-    return np.array([STATURE_DEVIATION / stature_of(dict(zip(sizes.names(), values))) * values, girth])
+    return np.array([STATURE_DEVIATION / stature_of(dict(zip(sizes.names(), values))) * values, girth])[: 2 if cameras > 2 else 1]
 
 
 UPRIGHT = ("ankle_height", "shank_length", "thigh_length", "hip_drop", "trunk_height", "lumbar_height", "thorax_height", "neck_length",
@@ -160,9 +161,9 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
     which what the body does not explain is left out; 0: never. `begin`: frame in which the person is searched for. Raises `TrackingError`
     if no person is found.
 
-    Silhouettes of a person who stands upright hardly distinguish front and back. With `both_fronts`, where a body that faces the other way
-    fits nearly as well, the person is measured facing that way, too, and what fits better is kept; not with cylinders, which have no
-    front. A front of which the frames' keypoints are certain is the front.
+    Silhouettes of a person who stands upright hardly distinguish front and back, and those of two cameras four quarters. With
+    `both_fronts`, where a body that faces another way fits nearly as well, the person is measured facing that way, too, and what fits best
+    is kept; not with cylinders, which have no front. A front of which the frames' keypoints are certain is the front.
     """
     first = first_frames(first)
     plain, prior = replace(settings, method="hybrid", refinement="gauss_newton"), Deviations.of(spread)
@@ -208,15 +209,20 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
     other = rng.spawn(1)[0]  # the numbers drawn afterwards do not depend on whether a front is tried
     estimate, tracker, found = best
     about = min(found, key=lambda each: abs(each[0] - begin))
-    facing = _other_front(other, tracker, first, *about) if both_fronts and front is None and settings.body != "cylinders" else None
-    turned = None if facing is None else measured(other, facing)
-    if turned is None:
+    other_ways = both_fronts and front is None and settings.body != "cylinders"
+    ways = _other_fronts(other, tracker, first, *about) if other_ways else []
+    turned = [each for facing in ways if (each := measured(other, facing)) is not None]
+    if not turned:
         return estimate
-    costs = [float(np.mean([state.cost for _, state in frames])) for *_, frames in (best, turned)]
-    estimate, _, found = best if costs[0] <= costs[1] else turned
+    by_cost = sorted((best, *turned), key=lambda each: _mean_cost(each[2]))
+    estimate, _, found = by_cost[0]
     index, state = found[0]
     middle = middle_of(first[index].points)
-    return replace(estimate, front=Front(heading_of(estimate.body, state.pose), middle, max(costs) / min(costs) - 1))
+    return replace(estimate, front=Front(heading_of(estimate.body, state.pose), middle, _mean_cost(by_cost[1][2]) / _mean_cost(found) - 1))
+
+
+def _mean_cost(found: Sequence[Found]) -> float:
+    return float(np.mean([state.cost for _, state in found]))
 
 
 def _shown_front(tracker: MultiviewTracker, first: Sequence[FirstFrame], begin: int) -> float | None:
@@ -226,15 +232,18 @@ def _shown_front(tracker: MultiviewTracker, first: Sequence[FirstFrame], begin: 
     return None if now is None else opening_heading([each for each in looks if each is not None], now)
 
 
-def _other_front(rng: np.random.Generator, tracker: MultiviewTracker, first: Sequence[FirstFrame], index: int,
-                 state: MultiviewState) -> float | None:
-    """The opposite heading (rad) of a state found in frame `index`, if a body that faces that way fits the frame nearly as well; None if it
-    does not."""
-    facing = heading_of(tracker.body, state.pose) + np.pi
+def _other_fronts(rng: np.random.Generator, tracker: MultiviewTracker, first: Sequence[FirstFrame], index: int,
+                  state: MultiviewState) -> list[float]:
+    """The headings (rad) opposite to that of a state found in frame `index`, or with two cameras a quarter turn from it, in which a body
+    fits the frame nearly as well."""
+    ways, out = 4 if tracker.sees_quarters_alike else 2, list[float]()
     points, masks, keypoints = first[index]
-    turned = tracker.start(rng, points, masks, facing=facing, keypoints=keypoints)
-    is_turned = np.cos(heading_of(tracker.body, turned.pose) - facing) > 0  # otherwise it has turned back while it was fitted
-    return facing if is_turned and turned.cost <= ALIKE * state.cost else None
+    for facing in heading_of(tracker.body, state.pose) + 2 * np.pi * np.arange(1, ways) / ways:
+        turned = tracker.start(rng, points, masks, facing=float(facing), keypoints=keypoints)
+        is_turned = np.cos(heading_of(tracker.body, turned.pose) - facing) > np.cos(np.pi / ways)  # or it has turned back while fitted
+        if is_turned and turned.cost <= ALIKE * state.cost:
+            out.append(float(facing))
+    return out
 
 
 def heading_of(body: Body, pose: Array) -> float:

@@ -51,7 +51,7 @@ FEW_CAMERAS, MANY_CAMERAS = 4, 6
 """Number of cameras up to which all poses go through the fine iterations of Gauss-Newton, as more of them are possible; and from which on
 the surface points are precise enough without free space."""
 PARTICLES = (40, 24, 16)
-"""Default particle numbers with up to `FEW_CAMERAS`, between, and from `MANY_CAMERAS` on."""
+"""Default particle numbers with up to `FEW_CAMERAS`, twice as many with two, between, and from `MANY_CAMERAS` on."""
 FINALISTS = 8
 """Number of poses, those that cost least after the coarse iterations of Gauss-Newton, that go through the fine ones with more than
 `FEW_CAMERAS`."""
@@ -340,7 +340,13 @@ class MultiviewTracker:
         """Number of particles, N."""
         if self.settings.method == "image_force":
             return 1
-        return self.settings.particles or PARTICLES[bisect((FEW_CAMERAS + 1, MANY_CAMERAS), len(self.cameras))]
+        usual = PARTICLES[bisect((FEW_CAMERAS + 1, MANY_CAMERAS), len(self.cameras))]
+        return self.settings.particles or (2 * usual if self.sees_quarters_alike else usual)
+
+    @property
+    def sees_quarters_alike(self) -> bool:
+        """Whether silhouettes hardly tell a body from one turned by a quarter or a half: those of two cameras."""
+        return len(self.cameras) == 2
 
     @cached_property
     def arm_colours(self) -> float:

@@ -1,0 +1,74 @@
+"""A film of two cameras tracked forward and backward: in each frame the pass that is likelier, with the doubt that leaves.
+
+The silhouettes of two cameras allow a front and a back, and nearly the same seen from the left and the right. A pass that has taken a wrong
+one stays with it, and the other pass comes from the other side. Which of them is right is a hidden state with two values; its odds in a
+frame are those of all frames, before and after (Rabiner 1989, forward-backward procedure). Poses are not mixed: what is between two fronts
+is neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from shadowpuppet.geometry import Array
+from shadowpuppet.motion.limbs import joints_of_limbs
+from shadowpuppet.motion.motion import Motion
+
+PER_COST = 1800.0
+"""Log odds of a pass whose body costs less by 1 m^2 for a second: the 180 for an overlap of 1 of several people (`tracking.people.front`),
+with the overlap's weight in the cost. Frames of a moment err together, so that it is less than their costs say."""
+REACH = 0.1
+"""Distance (m) of the passes' joints at which a change from one to the other has the odds 1/e: where they meet it costs nothing."""
+
+
+def likelier(forward: Motion, backward: Motion, limits: Mapping[str, float]) -> tuple[Motion, Array]:
+    """Two motions of the same frames as one, and the weight (T,), 0 or 1, of the backward one.
+
+    Deviations are those of a mixture about the likelier pass. A limb that is `tracked` in it is `uncertain` where the other place of it
+    takes a joint's deviation over the limit (m) for limbs of its kind (`limb_statuses`).
+    """
+    odds = backward_odds(forward, backward)
+    back = odds > 0
+    wrong = 1 / (1 + np.exp(np.abs(odds)))  # probability of the other pass
+    wrong[~(forward.known & backward.known)] = 0.0
+    chosen = {name: np.where(back.reshape(-1, *(1,) * (getattr(forward, name).ndim - 1)), getattr(backward, name), getattr(forward, name))
+              for name in ("poses", "joints", "cost", "overlap", "status", "limb_status")}
+    turn = (backward.poses - forward.poses + np.pi) % (2 * np.pi) - np.pi
+    pose_sd = _mixture(back, wrong, turn, forward.pose_sd, backward.pose_sd)
+    joint_sd = _mixture(back, wrong, backward.joints - forward.joints, forward.joint_sd, backward.joint_sd)
+    radius = np.sqrt((joint_sd**2).sum(2))
+    for n, (limb, own) in enumerate(joints_of_limbs(forward.joint_names).items()):
+        over = (wrong > 0) & (radius[:, own].max(1) > limits[limb.rpartition("_")[2]])
+        chosen["limb_status"][over & (chosen["limb_status"][:, n] == "tracked"), n] = "uncertain"
+    return replace(forward, pose_sd=pose_sd, joint_sd=joint_sd, **chosen), back.astype(float)
+
+
+def backward_odds(forward: Motion, backward: Motion) -> Array:
+    """Log odds (T,) that the backward pass is right, by the costs of all frames; infinite where only one pass has a pose."""
+    ahead, behind = forward.known, backward.known
+    both = ahead & behind
+    step = float(np.median(np.diff(forward.times))) if len(forward) > 1 else 0.0
+    told = np.where(both, PER_COST * step * (forward.cost - backward.cost), 0.0)
+    apart = np.sqrt(((backward.joints - forward.joints) ** 2).sum(2).mean(1))
+    change = -((np.where(both, apart, 0.0) / REACH) ** 2)
+    before, after = _carried(told, change), _carried(told[::-1], change[::-1])[::-1]
+    return np.where(both, before + told + after, np.where(behind & ~ahead, np.inf, -np.inf))
+
+
+def _carried(told: Array, change: Array) -> Array:
+    """Log odds (T,) that the frames before tell of each frame: `told` (T,) by each, and the log odds `change` (T,) of a change there."""
+    out = np.zeros(len(told))
+    for t in range(1, len(told)):
+        odds, rare = out[t - 1] + told[t - 1], (change[t - 1] + change[t]) / 2
+        out[t] = np.logaddexp(odds, rare) - np.logaddexp(0.0, odds + rare)
+    return out
+
+
+def _mixture(back: Array, wrong: Array, apart: Array, forward: Array, backward: Array) -> Array:
+    """Deviations (T, ...) about the likelier of two values that are `apart` (T, ...), of deviations `forward` and `backward`."""
+    back, wrong = (each.reshape(-1, *(1,) * (apart.ndim - 1)) for each in (back, wrong))
+    own, other = np.where(back, backward, forward), np.where(back, forward, backward)
+    return np.where(wrong > 0, np.sqrt((1 - wrong) * own**2 + wrong * (other**2 + apart**2)), own)
