@@ -29,6 +29,7 @@ from shadowpuppet.pipeline.track import track_recording
 from shadowpuppet.tracking.multiview.settings import for_smeared
 from shadowpuppet.tracking.multiview.size_estimation import Front
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
+from shadowpuppet.tracking.smoothing.likelier_pass import likelier
 
 pytestmark = pytest.mark.usefixtures("scale_unfitted")
 FRAMES = 16
@@ -135,6 +136,21 @@ def test_who_was_there_is_reported_and_saved(run):
 def test_the_same_seed_is_the_same_run(recording, run, tmp_path):
     track_recording(recording, tmp_path / "again", make_options(QUICK))
     assert (tmp_path / "again" / "joints.csv").read_bytes() == (folder_of(run) / "joints.csv").read_bytes()
+
+
+def test_films_of_two_cameras_are_tracked_both_ways_unless_keypoints_show_the_front(untaught, tmp_path, monkeypatch):
+    passes = []
+    monkeypatch.setattr(person_rig, "likelier", lambda *given: passes.append(given[:2]) or likelier(*given))
+    pair = QUICK | {"camera": "cam1,cam3"}
+    found = track_recording(untaught, tmp_path / "run", make_options(pair))
+    ((forward, backward),) = passes
+    assert len(forward) == len(backward) == len(found.motion) == FRAMES
+    assert found.metrics["backward_s"] > 0
+    assert "backward_s" not in track_recording(untaught, tmp_path / "off", make_options(pair | {"smooth": "off"})).metrics
+    subject = person_rig.known_person(np.random.default_rng(0), actor.cameras()[:2], make_options(FEW), made_rig.RATE,
+                                      Person(TRUE, 1.75, "known"), {}, True)
+    assert not subject.both_ways
+    assert dataclasses.replace(subject, silhouettes_alone=True).both_ways
 
 
 @pytest.mark.parametrize(("smeared", "emptiness", "silhouettes"), [(False, 2.0, 0.1), (True, 0.5, 0.05)])

@@ -76,6 +76,20 @@ def test_a_person_is_searched_for_about_a_direction(turn, rng):
     assert (actor.apart(of, found.best, pose)[0] < 0.03) == (turn < 1)
 
 
+@pytest.mark.parametrize(("cameras", "number"), [(2, 3), (3, 7)])
+def test_before_two_cameras_a_direction_is_that_of_a_quarter(cameras, number, rng, monkeypatch):
+    of, about, towards = actor.body(), [], pose_search._towards
+
+    def watched(*given):
+        about.append(towards(*given))
+        return about[-1]
+
+    monkeypatch.setattr(pose_search, "_towards", watched)
+    observation = MultiviewObservation(BodyInViews(of, ()), actor.surface(of, actor.stance(of.skeleton), rng, 5), (None,) * cameras)
+    search(rng, of, Refiner(of), observation, None, lambda poses: (np.zeros(len(poses)), np.zeros(len(poses))), 1, 0.0)
+    assert len(np.unique(about[0][:, 3].round(6))) == number  # of 16 in a turn
+
+
 @pytest.mark.parametrize(("hips", "knees", "bow"), [(80, 92, 4), (6, 84, 3), (4, 8, -84), (4, 8, 82)])
 @pytest.mark.parametrize("heading", [0.3, 2.2])
 def test_a_person_who_sits_kneels_or_lies_is_found_facing_where_they_face(hips, knees, bow, heading, rng):

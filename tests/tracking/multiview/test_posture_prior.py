@@ -106,3 +106,12 @@ def test_training_motion_says_what_is_usual_of_the_trunk(rng):
     assert np.isinf(usual.below[skeleton.dof_indices(["root_heading", "left_knee_flexion", "root_x"])]).all()
     lone = PosturePrior.of(skeleton, library[:1])
     np.testing.assert_array_equal(lone.rest, PosturePrior.of(skeleton).rest)  # one pose says nothing of deviations
+
+
+def test_feet_of_people_who_stand_are_level():
+    skeleton = actor.body().skeleton
+    prior, flexion = PosturePrior.of(skeleton), skeleton.dof_names.index("left_ankle_flexion")
+    poses = np.zeros((4, len(skeleton.dofs)))
+    poses[1:, flexion] = np.radians([-15, 20, -1e6])
+    poses[:, skeleton.dof_names.index("left_hip_x")] = 0.4  # no matter to the feet
+    np.testing.assert_allclose(prior.rarity_of_feet(poses), [0, 0.45, 0.45, MAX_PENALTY / 2], rtol=1e-3)

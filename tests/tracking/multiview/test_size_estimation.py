@@ -17,7 +17,7 @@ from shadowpuppet.body.whole_body import anatomical
 from shadowpuppet.errors import TrackingError
 from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.multiview import size_estimation
-from shadowpuppet.tracking.multiview.height_estimation import FirstFrame
+from shadowpuppet.tracking.multiview.height_estimation import FirstFrame, first_frames
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings
 from shadowpuppet.tracking.multiview.size_estimation import (
     CLOTHES,
@@ -32,7 +32,8 @@ from shadowpuppet.tracking.multiview.size_estimation import (
     shared_deviations,
     size_deviations,
 )
-from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
+from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
+from shadowpuppet.tracking.particle_filter import Particles
 
 SETTINGS = MultiviewSettings(particles=8)
 NAMES = AnatomicalSizes.names()
@@ -158,6 +159,36 @@ def test_a_body_that_faces_the_wrong_way_at_first_is_measured_both_ways(monkeypa
     assert found.front.heading_in(first[0][0]) == found.front.heading
     assert found.front.heading_in(first[1][0]) is None
     assert asked[0] is None
+
+
+@pytest.mark.parametrize(("cameras", "turns"), [(2, [90, 180, 270]), (3, [180])])
+def test_two_cameras_may_show_each_of_four_quarters(cameras, turns, monkeypatch):
+    tracker, (frame, *_) = MultiviewTracker(actor.body(), actor.cameras()[:cameras], SETTINGS), first_frames(stout()[2])
+    pose = stout()[1][0]
+    state = MultiviewState(pose, 0 * pose, Particles(pose[None], np.zeros(1), np.zeros(1)), 1.0, 0.9, "tracked")
+    heading = actor.body().skeleton.dof_names.index("root_heading")
+    here, asked = size_estimation.heading_of(actor.body(), state.pose), list[float]()
+
+    def start(self, rng, points, masks, facing, keypoints):
+        asked.append(facing)
+        pose = state.pose.copy()
+        pose[heading] = here if len(asked) == 1 else facing + 0.1  # the first one turns back while it is fitted
+        return state._replace(pose=pose, cost=1.1 if len(asked) < 3 else 2.0)
+
+    monkeypatch.setattr(MultiviewTracker, "start", start)
+    found = size_estimation._other_fronts(np.random.default_rng(0), tracker, [frame], 0, state)
+    np.testing.assert_allclose(np.degrees(np.array(asked) - here), turns)
+    assert found == asked[1:2]  # neither what turns back nor what costs much more
+
+
+def test_the_front_of_two_cameras_is_always_kept():
+    true, poses, first = stout()
+    pair = [(frame[0], frame[1][:2]) for frame in first]
+    found = estimate_sizes(np.random.default_rng(0), anatomical, true, np.zeros(len(NAMES)), actor.cameras()[:2], pair, SETTINGS,
+                           both_fronts=False)
+    assert found.front is not None
+    assert found.front.lead == np.inf
+    assert np.cos(found.front.heading - size_estimation.heading_of(actor.body(), poses[0])) > 0.7
 
 
 def with_keypoints(exchanged: tuple[int, ...] = ()) -> list[FirstFrame]:

@@ -43,10 +43,11 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
     """The `number` best poses (number, D) for a frame's surface points, with the costs and weights of `weigh`.
 
     `library`: initial poses (L, D); their position and heading are ignored. `facing`: heading (rad) from which poses begin less than a
-    quarter turn away; None: in all headings. The poses that keypoints show are refined however far they are from the points. Without
-    surface points poses are placed and chosen by keypoints.
+    quarter turn away, and with two cameras, which hardly tell a quarter turn, half of one; None: in all headings. The poses that keypoints
+    show are refined however far they are from the points. Without surface points poses are placed and chosen by keypoints.
     """
     keypoints = observation.keypoints
+    reach = np.pi / (4 if len(observation.masks) == 2 else 2)
 
     def rough(poses: Array, tau: float) -> Array:
         if keypoints is not None and not len(observation.surface.points):
@@ -64,10 +65,10 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
         poses = np.concatenate([poses, stood(body, poses, _lowest(observation.surface.points))])
     elif keypoints is not None:
         poses = placed_by_rays(body, poses, refiner.landmarks, keypoints.sights)
-    poses = _towards(body, poses, facing)
+    poses = _towards(body, poses, facing, reach)
     poses = poses[rough(poses, COARSE_STAGES[0][2]).argsort(kind="stable")[:COARSE_CANDIDATES]]
     if keypoints is not None:
-        poses = np.concatenate([poses, _towards(body, keypoints.either_way, facing)])
+        poses = np.concatenate([poses, _towards(body, keypoints.either_way, facing, reach)])
     poses = best_of((evaluate(_refined(refiner, observation, poses, COARSE_STAGES), weigh),), FINE_CANDIDATES).poses
     found = best_of((evaluate(_refined(refiner, observation, poses, FINE_STAGES), weigh),), number)
     for _, side in product(range(ARM_ROUNDS), ("left", "right")):
@@ -77,9 +78,9 @@ def search(rng: np.random.Generator, body: Body, refiner: Refiner, observation: 
     return found
 
 
-def _towards(body: Body, poses: Array, facing: float | None) -> Array:
-    """Those of poses (N, D) that face less than a quarter turn away from a heading (rad); None: all."""
-    return poses if facing is None else poses[np.cos(poses[:, heading_column(body.skeleton)] - facing) > 1e-6]
+def _towards(body: Body, poses: Array, facing: float | None, reach: float) -> Array:
+    """Those of poses (N, D) that face less than `reach` (rad) away from a heading (rad); None: all."""
+    return poses if facing is None else poses[np.cos(poses[:, heading_column(body.skeleton)] - facing) > np.cos(reach) + 1e-6]
 
 
 def _refined(refiner: Refiner, observation: MultiviewObservation, poses: Array, stages: tuple) -> Array:

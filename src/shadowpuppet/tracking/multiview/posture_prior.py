@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
@@ -16,6 +18,8 @@ OBSERVED_JOINTS = ("left_", "right_")
 """Prefixes of joints whose angles the surface shows well enough; they have no prior."""
 UNSHOWN = ("_ankle_inversion",)
 """Ends of the names of their DOF that it does not show: a foot's roll hardly changes the hull."""
+ANKLES = "_ankle_flexion"
+"""End of the names of the ankles' DOF that raise and lower the toes."""
 MAX_PENALTY = 9.0
 """Bound of each DOF's penalty: that of three standard deviations (see `Skeleton.posture_penalty`)."""
 
@@ -27,6 +31,18 @@ LEGS = (((3, 5), (3, 5), 0), ((25, 10), (-15, 20), 0), ((-15, 20), (25, 10), 0),
 seated, kneeling, lying on the back and on the front."""
 
 
+class Rest(NamedTuple):
+    """Some DOF as they are at rest."""
+
+    dofs: NDArray[np.int64]
+    """Their indices (K,)."""
+    rest: Array
+    """Values (K,), rad."""
+    below: Array
+    above: Array
+    """Deviations (K,) below and above them, rad."""
+
+
 @dataclass(frozen=True, eq=False)
 class PosturePrior:
     """Rest values of the DOF, and deviations below and above them, each of shape (D,); infinite for DOF without a prior."""
@@ -34,6 +50,8 @@ class PosturePrior:
     rest: Array
     below: Array
     above: Array
+    ankles: Rest
+    """Of the ankles' flexions: the feet of people who stand are level."""
 
     @classmethod
     def of(cls, skeleton: Skeleton, library: Array | None = None) -> PosturePrior:
@@ -44,7 +62,15 @@ class PosturePrior:
             spread = np.maximum(INFLATION * library.std(0), MIN_DEVIATION)
             rest, below, above = (np.where(known, new, old) for new, old in ((library.mean(0), rest), (spread, below), (spread, above)))
         constrained = np.array([not dof.joint.startswith(OBSERVED_JOINTS) or dof.name.endswith(UNSHOWN) for dof in skeleton.dofs])
-        return cls(rest, np.where(constrained, below, np.inf), np.where(constrained, above, np.inf))
+        ends = [n for n, dof in enumerate(skeleton.dofs) if dof.name.endswith(ANKLES)]
+        ankles = Rest(np.array(ends, np.int64), *(np.array(each)[ends] for each in skeleton.rest_and_spread))
+        return cls(rest, np.where(constrained, below, np.inf), np.where(constrained, above, np.inf), ankles)
+
+    def rarity_of_feet(self, poses: Array) -> Array:
+        """How rare the flexions of both ankles are among people (N,), of poses (N, D), as minus a log density: half the squared deviations,
+        each bounded."""
+        squared = _squared(poses[:, self.ankles.dofs], *self.ankles[1:])
+        return 0.5 * (squared / (1 + squared / MAX_PENALTY)).sum(1)
 
     def penalty(self, poses: Array) -> Array:
         """Penalty (N,) of poses (N, D): squared deviations from rest in units of the prior's, each bounded, summed over the DOF."""
@@ -62,8 +88,13 @@ class PosturePrior:
         return (pull * pose + rest * self.rest) / (pull + rest + 1e-30), pull + rest
 
     def _squared(self, poses: Array) -> Array:
-        off = poses - self.rest
-        return (off / np.where(off < 0, self.below, self.above)) ** 2
+        return _squared(poses, self.rest, self.below, self.above)
+
+
+def _squared(values: Array, rest: Array, below: Array, above: Array) -> Array:
+    """Squared deviations (N, D) of values (N, D) from rest, in units of those below and above it (D,)."""
+    off = values - rest
+    return (off / np.where(off < 0, below, above)) ** 2
 
 
 def usual_postures(skeleton: Skeleton) -> Array:

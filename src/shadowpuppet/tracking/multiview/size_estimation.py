@@ -69,14 +69,15 @@ MIN_FRAMES = 4
 
 
 class Front(NamedTuple):
-    """The front of a person whose silhouettes hardly show it."""
+    """The front of a person whose silhouettes hardly show it, as those of two cameras never do."""
 
     heading: float
     """In the first frame in which the person was found, rad."""
     middle: Array
     """Mean of that frame's surface points (3,), world."""
     lead: float
-    """Mean cost of the best body that faces another way, with sizes that suit it, over that of the estimate, less 1."""
+    """Mean cost of the best body that faces another way, with sizes that suit it, over that of the estimate, less 1; infinite if none fits
+    the first frame nearly as well."""
 
     def heading_in(self, surface: SurfacePoints) -> float | None:
         """The heading, rad, if these are that frame's surface points; None of others."""
@@ -212,13 +213,13 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
     other_ways = both_fronts and front is None and settings.body != "cylinders"
     ways = _other_fronts(other, tracker, first, *about) if other_ways else []
     turned = [each for facing in ways if (each := measured(other, facing)) is not None]
-    if not turned:
+    if not turned and not tracker.sees_quarters_alike:
         return estimate
     by_cost = sorted((best, *turned), key=lambda each: _mean_cost(each[2]))
     estimate, _, found = by_cost[0]
+    lead = _mean_cost(by_cost[1][2]) / _mean_cost(found) - 1 if turned else np.inf
     index, state = found[0]
-    middle = middle_of(first[index].points)
-    return replace(estimate, front=Front(heading_of(estimate.body, state.pose), middle, _mean_cost(by_cost[1][2]) / _mean_cost(found) - 1))
+    return replace(estimate, front=Front(heading_of(estimate.body, state.pose), middle_of(first[index].points), lead))
 
 
 def _mean_cost(found: Sequence[Found]) -> float:

@@ -281,6 +281,8 @@ class MultiviewTracker:
             extras.append(lambda poses: s.arms * self.rarity_of_arms(poses))
         if s.limbs:
             extras.append(lambda poses: s.limbs * self.rarity_of_limbs(poses))
+            if self.sees_quarters_alike:  # raised toes would explain the silhouettes of feet that point another way
+                extras.append(lambda poses: s.limbs * self.posture_prior.rarity_of_feet(poses))
         if observation.keypoints is not None:
             extras.append(observation.keypoints.cost)
         return extras if observation.also is None else [*extras, observation.also]

@@ -17,20 +17,14 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import joints_of_limbs
 from shadowpuppet.motion.motion import Motion
 
-PER_COST = 1800.0
-"""Log odds of a pass whose body costs less by 1 m^2 for a second: the 180 for an overlap of 1 of several people (`tracking.people.front`),
-with the overlap's weight in the cost. Frames of a moment err together, so that it is less than their costs say."""
-REACH = 0.1
-"""Distance (m) of the passes' joints at which a change from one to the other has the odds 1/e: where they meet it costs nothing."""
 
-
-def likelier(forward: Motion, backward: Motion, limits: Mapping[str, float]) -> tuple[Motion, Array]:
-    """Two motions of the same frames as one, and the weight (T,), 0 or 1, of the backward one.
+def likelier(forward: Motion, backward: Motion, per_cost: float, limits: Mapping[str, float]) -> tuple[Motion, Array]:
+    """Two motions of the same frames as one, and the weight (T,), 0 or 1, of the backward one. `per_cost` as in `backward_odds`.
 
     Deviations are those of a mixture about the likelier pass. A limb that is `tracked` in it is `uncertain` where the other place of it
     takes a joint's deviation over the limit (m) for limbs of its kind (`limb_statuses`).
     """
-    odds = backward_odds(forward, backward)
+    odds = backward_odds(forward, backward, per_cost)
     back = odds > 0
     wrong = 1 / (1 + np.exp(np.abs(odds)))  # probability of the other pass
     wrong[~(forward.known & backward.known)] = 0.0
@@ -46,14 +40,18 @@ def likelier(forward: Motion, backward: Motion, limits: Mapping[str, float]) -> 
     return replace(forward, pose_sd=pose_sd, joint_sd=joint_sd, **chosen), back.astype(float)
 
 
-def backward_odds(forward: Motion, backward: Motion) -> Array:
-    """Log odds (T,) that the backward pass is right, by the costs of all frames; infinite where only one pass has a pose."""
+def backward_odds(forward: Motion, backward: Motion, per_cost: float) -> Array:
+    """Log odds (T,) that the backward pass is right, by the costs of all frames; infinite where only one pass has a pose.
+
+    `per_cost`: log odds of a pass whose body costs less by 1 m^2 for a second. A change from one pass to the other is the rarer the further
+    their joints are apart in units of their stated deviations.
+    """
     ahead, behind = forward.known, backward.known
     both = ahead & behind
     step = float(np.median(np.diff(forward.times))) if len(forward) > 1 else 0.0
-    told = np.where(both, PER_COST * step * (forward.cost - backward.cost), 0.0)
-    apart = np.sqrt(((backward.joints - forward.joints) ** 2).sum(2).mean(1))
-    change = -((np.where(both, apart, 0.0) / REACH) ** 2)
+    told = np.where(both, per_cost * step * (forward.cost - backward.cost), 0.0)
+    apart = (backward.joints - forward.joints) ** 2 / (forward.joint_sd**2 + backward.joint_sd**2)
+    change = -np.where(both, apart.sum(2).mean(1) / 2, 0.0)
     before, after = _carried(told, change), _carried(told[::-1], change[::-1])[::-1]
     return np.where(both, before + told + after, np.where(behind & ~ahead, np.inf, -np.inf))
 
