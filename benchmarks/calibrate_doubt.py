@@ -214,8 +214,11 @@ def by_run(joints: Iterable[LimbJoint]) -> dict[Tracked, list[LimbJoint]]:
 
 def fit_limits(joints: Sequence[LimbJoint]) -> dict[str, float]:
     """Of each kind of limb the greatest limit (m), up to `FAR_ERROR`, with at most `SILENT` of its joints far off and vouched for, and at
-    most `OFTEN` of the runs in which these are over `MOST_SILENT` of all joints: silence has priority over false alarms."""
+    most `OFTEN` of the runs in which these are over `MOST_SILENT` of all joints: silence has priority over false alarms. With two cameras,
+    `MOST_SILENT` of all runs' alone: a front is wrong in a whole run or in none, so that one run in a hundred would decide."""
     kinds = {kind: [each for each in joints if each.kind == kind] for kind in dict.fromkeys(each.kind for each in joints)}
+    if "turned" in joints[0].run.components:
+        return {kind: min(FAR_ERROR, _limit(own, MOST_SILENT * sum(len(each.errors) for each in own))) for kind, own in kinds.items()}
     number = {run: sum(len(each.errors) for each in own) for run, own in by_run(joints).items()}
     limits = {}
     for kind, own in kinds.items():
