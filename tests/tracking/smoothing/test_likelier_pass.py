@@ -74,6 +74,12 @@ def test_where_one_pass_is_lost_the_other_counts_alone():
     assert np.isfinite(np.delete(both.joints, 4, 0)).all()
 
 
+def test_one_pass_may_be_certain():
+    both, share = likelier(passing(0.0, 0.02), passing(np.pi, 10.0), PER_COST, LIMITS)
+    assert not share.any()
+    np.testing.assert_allclose(both.joint_sd, 0.03)
+
+
 def test_passes_that_agree_change_freely_and_doubt_nothing():
     cost = np.where(np.arange(FRAMES) % 20 < 10, 0.02, 0.01)
     forward, backward = passing(0.0, cost), passing(0.001, 0.015)

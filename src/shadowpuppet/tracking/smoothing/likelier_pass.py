@@ -26,7 +26,8 @@ def likelier(forward: Motion, backward: Motion, per_cost: float, limits: Mapping
     """
     odds = backward_odds(forward, backward, per_cost)
     back = odds > 0
-    wrong = 1 / (1 + np.exp(np.abs(odds)))  # probability of the other pass
+    less = np.exp(-np.abs(odds))
+    wrong = less / (1 + less)  # probability of the other pass
     wrong[~(forward.known & backward.known)] = 0.0
     chosen = {name: np.where(back.reshape(-1, *(1,) * (getattr(forward, name).ndim - 1)), getattr(backward, name), getattr(forward, name))
               for name in ("poses", "joints", "cost", "overlap", "status", "limb_status")}
