@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import joints_of_limbs
@@ -66,8 +67,9 @@ def _carried(told: Array, change: Array) -> Array:
     return out
 
 
-def _mixture(back: Array, wrong: Array, apart: Array, forward: Array, backward: Array) -> Array:
+def _mixture(back: NDArray[np.bool_], wrong: Array, apart: Array, forward: Array, backward: Array) -> Array:
     """Deviations (T, ...) about the likelier of two values that are `apart` (T, ...), of deviations `forward` and `backward`."""
-    back, wrong = (each.reshape(-1, *(1,) * (apart.ndim - 1)) for each in (back, wrong))
+    shape = -1, *(1,) * (apart.ndim - 1)
+    back, wrong = back.reshape(shape), wrong.reshape(shape)
     own, other = np.where(back, backward, forward), np.where(back, forward, backward)
     return np.where(wrong > 0, np.sqrt((1 - wrong) * own**2 + wrong * (other**2 + apart**2)), own)
