@@ -103,7 +103,7 @@ class MultiviewDoubt:
             columns = dict(zip(("bare", "unexplained", "outside", "unseen"), by_joint[:4] * levers)) | {"residual": by_joint[4]}
             columns |= {"misfit": np.fmax(1 - state.overlap - GOOD_MISFIT, 0) * levers, "still": stillness(still) * levers}
             found |= _along_axes(columns) | {"swapped": np.abs(points - points[self.counterparts]) * (apart < CROSSING)[:, None]}
-            if len(masks) == 2:
+            if kind_of(masks, keypoints) == "pair":
                 found["turned"] = self._beside_axis(points)
         now = Before(seconds, trail.with_frame(seconds, points), tuple(masks), still, apart)
         return Evidence(found, dict(zip(LIMBS, unseen.tolist()))), now

@@ -68,8 +68,8 @@ def blended(forward: Motion, backward: Motion, points: Points, scale: float = 1.
     poses, joints = _mixed(share, forward.poses, backward.poses), np.where(mostly[:, None, None], backward.joints, forward.joints)
     mixed = (share > 0) & (share < 1)
     joints[mixed] = points(poses[mixed])
-    pose_sd = _mixed_sd(share, (forward.poses, backward.poses), (forward.pose_sd, backward.pose_sd), poses)
-    joint_sd = _mixed_sd(share, (forward.joints, backward.joints), (forward.joint_sd, backward.joint_sd), joints)
+    pose_sd = mixed_deviations(share, (forward.poses, backward.poses), (forward.pose_sd, backward.pose_sd), poses)
+    joint_sd = mixed_deviations(share, (forward.joints, backward.joints), (forward.joint_sd, backward.joint_sd), joints)
     return replace(
         forward, poses=poses, joints=joints, pose_sd=pose_sd, joint_sd=joint_sd, cost=_mixed(share, forward.cost, backward.cost),
         overlap=_mixed(share, forward.overlap, backward.overlap), status=np.where(mostly, backward.status, forward.status),
@@ -87,7 +87,7 @@ def _mixed(share: Array, forward: Array, backward: Array) -> Array:
     return np.where(share == 0, forward, np.where(share == 1, backward, (1 - share) * forward + share * backward))
 
 
-def _mixed_sd(share: Array, values: tuple[Array, Array], sds: tuple[Array, Array], mean: Array) -> Array:
+def mixed_deviations(share: Array, values: tuple[Array, Array], sds: tuple[Array, Array], mean: Array) -> Array:
     """Deviations (T, ...) of a mixture of two values (T, ...) with their deviations, about `mean` (T, ...)."""
     forward, backward = (sd**2 + (value - mean) ** 2 for value, sd in zip(values, sds))
     return np.sqrt(_mixed(share, forward, backward))

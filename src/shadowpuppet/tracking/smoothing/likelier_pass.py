@@ -12,11 +12,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import joints_of_limbs
 from shadowpuppet.motion.motion import Motion
+from shadowpuppet.tracking.smoothing.both_ways import mixed_deviations
 
 
 def likelier(forward: Motion, backward: Motion, per_cost: float, limits: Mapping[str, float]) -> tuple[Motion, Array]:
@@ -26,18 +26,15 @@ def likelier(forward: Motion, backward: Motion, per_cost: float, limits: Mapping
     takes a joint's deviation over the limit (m) for limbs of its kind (`limb_statuses`).
     """
     odds = backward_odds(forward, backward, per_cost)
-    back = odds > 0
-    less = np.exp(-np.abs(odds))
-    wrong = less / (1 + less)  # probability of the other pass
-    wrong[~(forward.known & backward.known)] = 0.0
+    back, share = odds > 0, np.exp(-np.logaddexp(0.0, -odds))  # whether, and how probably, the backward pass is right
     chosen = {name: np.where(back.reshape(-1, *(1,) * (getattr(forward, name).ndim - 1)), getattr(backward, name), getattr(forward, name))
               for name in ("poses", "joints", "cost", "overlap", "status", "limb_status")}
-    turn = (backward.poses - forward.poses + np.pi) % (2 * np.pi) - np.pi
-    pose_sd = _mixture(back, wrong, turn, forward.pose_sd, backward.pose_sd)
-    joint_sd = _mixture(back, wrong, backward.joints - forward.joints, forward.joint_sd, backward.joint_sd)
+    ahead, behind = ((motion.poses - chosen["poses"] + np.pi) % (2 * np.pi) - np.pi for motion in (forward, backward))
+    pose_sd = mixed_deviations(share, (ahead, behind), (forward.pose_sd, backward.pose_sd), np.zeros_like(ahead))
+    joint_sd = mixed_deviations(share, (forward.joints, backward.joints), (forward.joint_sd, backward.joint_sd), chosen["joints"])
     radius = np.sqrt((joint_sd**2).sum(2))
     for n, (limb, own) in enumerate(joints_of_limbs(forward.joint_names).items()):
-        over = (wrong > 0) & (radius[:, own].max(1) > limits[limb.rpartition("_")[2]])
+        over = np.isfinite(odds) & (radius[:, own].max(1) > limits[limb.rpartition("_")[2]])
         chosen["limb_status"][over & (chosen["limb_status"][:, n] == "tracked"), n] = "uncertain"
     return replace(forward, pose_sd=pose_sd, joint_sd=joint_sd, **chosen), back.astype(float)
 
@@ -59,17 +56,10 @@ def backward_odds(forward: Motion, backward: Motion, per_cost: float) -> Array:
 
 
 def _carried(told: Array, change: Array) -> Array:
-    """Log odds (T,) that the frames before tell of each frame: `told` (T,) by each, and the log odds `change` (T,) of a change there."""
+    """Log odds (T,) of each frame given all earlier frames, from every frame's evidence `told` (T,) and the log odds `change` (T,) that the
+    right pass changes there."""
     out = np.zeros(len(told))
     for t in range(1, len(told)):
         odds, rare = out[t - 1] + told[t - 1], (change[t - 1] + change[t]) / 2
         out[t] = np.logaddexp(odds, rare) - np.logaddexp(0.0, odds + rare)
     return out
-
-
-def _mixture(back: NDArray[np.bool_], wrong: Array, apart: Array, forward: Array, backward: Array) -> Array:
-    """Deviations (T, ...) about the likelier of two values that are `apart` (T, ...), of deviations `forward` and `backward`."""
-    shape = -1, *(1,) * (apart.ndim - 1)
-    back, wrong = back.reshape(shape), wrong.reshape(shape)
-    own, other = np.where(back, backward, forward), np.where(back, forward, backward)
-    return np.where(wrong > 0, np.sqrt((1 - wrong) * own**2 + wrong * (other**2 + apart**2)), own)
