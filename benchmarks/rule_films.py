@@ -26,7 +26,7 @@ FAR_MM, NEAR_MM = 300.0, 100.0
 """Errors (mm) above which a joint is far off, and below which it is near the truth."""
 SHOWN = 10
 """Number of frames, spread over the film, whose silhouettes are compared with exact ones."""
-GROUPS = ("ground", "rings", "faults", "postures", "people", "made", "real")
+GROUPS = ("ground", "rings", "faults", "postures", "people", "whole", "pairs", "made", "real")
 
 
 class Film(NamedTuple):
@@ -89,6 +89,7 @@ def films(shared: Path | None = None) -> Iterator[Film]:
     import fault_rows
     import people
     import postures
+    import whole_people
 
     from shadowpuppet.synthetic import proving_ground, proving_rings
 
@@ -102,6 +103,8 @@ def films(shared: Path | None = None) -> Iterator[Film]:
     for film in postures.films():
         yield Film("postures", film.name, partial(_made, film.spec, True), {"body": film.body} if film.body else {})
     yield from (Film("people", film.name, partial(_made, film.spec, True)) for film in people.FILMS)
+    yield from (Film("whole", film.name, partial(_made, film.spec, True)) for film in whole_people.films())
+    yield from (Film("pairs", film.name, partial(_made, film.spec, True)) for film in whole_people.pairs())
     yield from (Film("made", f"alone {n}", partial(_made, _alone(n), n == 2)) for n in range(5))
     if shared is None or not (shared / "real").is_dir():
         return

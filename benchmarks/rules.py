@@ -3,7 +3,8 @@
     python benchmarks/rules.py [--count] [--switch SWITCH]... [--films "ground;rings/rings_jog"] [--seeds 5] [--silhouettes]
         [--shared ../shared] [--out build/rules]
 
-`rule_films.py` has the films: the proving grounds, faults, postures, people, five made people, and real films where they are.
+`rule_films.py` has the films: the proving grounds, faults, postures, people, whole people before one camera and two, five made people, and
+real films where they are.
 
 `--count` tracks each film once, with one seed, and lists the lines of `ROOMS` that never ran, or in few films only, with the named
 constants in them and in the conditions around them. It needs the package `coverage`. Lines of compiled kernels are not counted, nor are
