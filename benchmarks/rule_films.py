@@ -18,6 +18,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from counted_lines import lines_that_ran
+
 from shadowpuppet.errors import ShadowPuppetError
 
 LOST_MM = 500.0
@@ -234,21 +236,9 @@ def _measured(film: Film, seed: int, arguments: argparse.Namespace) -> dict[str,
         return silhouettes(film, folder)
     if not arguments.lines:
         return run_film(film, folder, seed)
-    import coverage
-
-    import shadowpuppet
-
-    package = Path(shadowpuppet.__file__).parent
     film.make(folder / film.label)
-    tracer = coverage.Coverage(data_file=None, config_file=False, source_pkgs=["shadowpuppet"], messages=False)
-    tracer.start()
-    try:
-        found = run_film(film, folder, seed)
-    finally:
-        tracer.stop()
-    data = tracer.get_data()
-    files = {Path(file).relative_to(package).as_posix(): sorted(data.lines(file) or ()) for file in data.measured_files()}
-    return found | {"lines": {file: numbers for file, numbers in files.items() if numbers}}
+    lines_that_ran("shadowpuppet")  # those of making the film
+    return run_film(film, folder, seed) | {"lines": lines_that_ran("shadowpuppet")}
 
 
 def run() -> None:

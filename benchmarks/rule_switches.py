@@ -16,11 +16,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from counted_lines import COMPILED, count_lines
+
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "src" / "shadowpuppet"
 EDIT = re.compile(r"(?P<file>[\w/]+\.py):(?P<name>\w+)(?P<call>\(\))?=(?P<value>.+)", re.DOTALL)
-COMPILED = re.compile(r"\b(njit|kernel|inline_kernel|reduction_kernel|device|compiled)\b")
-"""Decorators of compiled functions."""
+DECORATOR = re.compile(rf"\b({'|'.join(COMPILED)})\b")
 SWITCHES: Mapping[str, Sequence[str]] = {
     "base": (),
 }
@@ -71,7 +72,7 @@ def is_compiled(edits: Iterable[Edit], package: Path = PACKAGE) -> bool:
             if isinstance(node, (ast.Assign, ast.AnnAssign)) and node.value is not None:
                 for name in _targets(node):
                     made_of.setdefault(name, set()).update(_names(node.value))
-            elif isinstance(node, ast.FunctionDef) and any(COMPILED.search(ast.unparse(each)) for each in node.decorator_list):
+            elif isinstance(node, ast.FunctionDef) and any(DECORATOR.search(ast.unparse(each)) for each in node.decorator_list):
                 named |= {node.name} | _names(node)
     while more := {name for name, parts in made_of.items() if parts & names} - names:
         names |= more
@@ -82,22 +83,24 @@ def _names(node: ast.AST) -> set[str]:
     return {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
 
 
-def copied(edits: Sequence[Edit], folder: Path, package: Path = PACKAGE) -> dict[str, str]:
+def copied(edits: Sequence[Edit], folder: Path, package: Path = PACKAGE, counted: bool = False) -> dict[str, str]:
     """Make a copy of the package with the edits, in a folder of its own in `folder`, and return the environment in which programs import
-    it. A copy of the same text is taken as it is."""
+    it. A copy of the same text is taken as it is. `counted`: its functions note the lines that run."""
     texts = {path.relative_to(package): path.read_text("utf-8") for path in sorted(package.rglob("*.py"))}
     for edit in edits:
         file = Path(edit.file)
         if file not in texts:
             raise SystemExit(f"switch: {edit.file} is not in {package.name}")
         texts[file] = edited(texts[file], edit)
-    place = folder / fingerprint(texts)
+    place = folder / (fingerprint(texts) + "_counted" * counted)
     fresh = is_compiled(edits, package)
     if not (place / "copied").exists():
         shutil.rmtree(place, ignore_errors=True)
         shutil.copytree(package, place / package.name, ignore=shutil.ignore_patterns("__pycache__") if fresh else None)
         for file in {Path(edit.file) for edit in edits}:
             (place / package.name / file).write_text(texts[file], encoding="utf-8")
+        if counted:
+            count_lines(place / package.name)
         (place / "copied").touch()
     paths = [str(place), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}

@@ -7,8 +7,7 @@
 real films where they are.
 
 `--count` tracks each film once, with one seed, and lists the lines of `ROOMS` that never ran, or in few films only, with the named
-constants in them and in the conditions around them. It needs the package `coverage`. Lines of compiled kernels are not counted, nor are
-values that arrays select.
+constants in them and in the conditions around them. Lines of compiled kernels are not counted, nor are values that arrays select.
 
 `--switch` tracks each film with the package as it is and with rules switched off: a name in `rule_switches.SWITCHES`, or edits with ` + `
 between them. Each switch has a process and, where the rule is in compiled code, kernels of its own. A film refused counts as lost. `se` is
@@ -25,7 +24,6 @@ from __future__ import annotations
 import argparse
 import ast
 import hashlib
-import importlib.util
 import json
 import subprocess
 import sys
@@ -36,13 +34,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import rule_films
 import smallest
+from counted_lines import COMPILED, called, is_text
 from rule_films import LOST_MM, films
 from rule_switches import PACKAGE, ROOT, SWITCHES, copied, fingerprint, parsed
 from speed.chain import ONE_THREAD_EACH
 
 ROOMS = ("tracking", "silhouette", "motion", "body", "calibration", "pipeline/person.py", "pipeline/person_rig.py", "pipeline/rig.py",
          "pipeline/subject.py")  # fmt: skip
-COMPILED = ("kernel", "inline_kernel", "reduction_kernel", "device", "compiled")
 FEW = 1
 """Number of films up to which a line counts as one of few films."""
 SHOWN = ("error", "silent", "false", "tracked", "overlap", "ms")
@@ -74,7 +72,7 @@ def runs(switch: str, labels: Sequence[str], args: argparse.Namespace, lines: bo
     """The runs of films by their labels with a switch: those that are missing are made in a process of their own."""
     edits = [parsed(text) for text in SWITCHES.get(switch) or ([] if switch == "base" else switch.split(" + "))]
     args.out.mkdir(parents=True, exist_ok=True)
-    environment = copied(edits, args.out / "packages") | ONE_THREAD_EACH
+    environment = copied(edits, args.out / "packages", counted=lines) | ONE_THREAD_EACH
     state = fingerprint({path.relative_to(PACKAGE): path.read_text("utf-8") for path in sorted(PACKAGE.rglob("*.py"))})
     name, flags = hashlib.sha256(f"{state} {switch}".encode()).hexdigest()[:12], ["--lines"] * lines
     flags += ["--silhouettes"] * (args.silhouettes and not lines)
@@ -115,12 +113,12 @@ def statements(tree: ast.AST, around: tuple[str, ...] = (), within: bool = False
     tree is part of a function."""
     out = list[Statement]()
     for child in ast.iter_child_nodes(tree):
-        if isinstance(child, ast.FunctionDef) and any(_called(each) in COMPILED for each in child.decorator_list):
+        if isinstance(child, ast.FunctionDef) and any(called(each) in COMPILED for each in child.decorator_list):
             continue
         head = [part for part in (getattr(child, name, None) for name in ("test", "iter")) if isinstance(part, ast.AST)]
         guarded = _joined(around, *head)
         defines = isinstance(child, (ast.FunctionDef, ast.ClassDef))
-        if within and isinstance(child, ast.stmt) and not defines and not _is_text(child):
+        if within and isinstance(child, ast.stmt) and not defines and not is_text(child):
             body = getattr(child, "body", None)
             last = max(child.lineno, body[0].lineno - 1 if body else child.end_lineno or 0)
             out.append(Statement(child.lineno, last, guarded if body else _joined(around, child)))
@@ -135,14 +133,6 @@ def constants(node: ast.AST) -> list[str]:
 
 def _joined(names: tuple[str, ...], *parts: ast.AST) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*names, *(name for part in parts for name in constants(part))]))
-
-
-def _called(node: ast.expr) -> str:
-    return node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else getattr(node, "id", "")
-
-
-def _is_text(node: ast.stmt) -> bool:
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
 def count_table(found: Iterable[Piece], number: int) -> str:
@@ -205,8 +195,7 @@ def chosen(text: str, shared: Path) -> list[str]:
 
 
 def _smallest(folder: Path) -> list[object]:
-    counted = ["--count"] if importlib.util.find_spec("coverage") else []
-    return [*counted, "--films", "tiny", "--seeds", 1, "--out", folder, "--shared", folder,
+    return ["--count", "--films", "tiny", "--seeds", 1, "--out", folder, "--shared", folder,
             "--switch", "tracking/status.py:UNCERTAIN_OVERLAP=0.0"]  # fmt: skip
 
 
@@ -223,8 +212,6 @@ def main() -> None:
     args = smallest.parse(parser, _smallest)
     labels = chosen(args.films, args.shared)
     if args.count:
-        if importlib.util.find_spec("coverage") is None:
-            parser.error("--count needs the package coverage: pip install coverage")
         found = runs("base", labels, args, lines=True)
         print(count_table(pieces(found), len(found)))
     if args.switch:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import json
 import os
 import subprocess
 import sys
@@ -105,3 +106,14 @@ def test_noise_is_the_seeds_share_of_the_mean(rules):
 def test_a_refused_film_counts_as_lost(rules):
     base, other = [{"film": "a", "seed": 0, "error": 20.0}], [{"film": "a", "seed": 0, "refused": "too dark"}]
     assert rules.compared(base, other)[0] == "20.0 -> 500.0"
+
+
+def test_a_counted_package_notes_the_lines_that_run_but_not_those_of_kernels(switches, planted, tmp_path):
+    source = '"""Doc."""\nfrom __future__ import annotations\n\n\ndef rule(x):\n    """Say."""\n    if x:\n        return 1\n    return 2\n'
+    (planted / "rules.py").write_text(source, encoding="utf-8")
+    program = "import json, planted.rules, planted.kernels; from counted_lines import lines_that_ran as ran; planted.rules.rule(0)"
+    program += "; planted.kernels.above(2.0); print(json.dumps([ran('planted'), ran('planted')]))"
+    environment = switches.copied([], tmp_path / "out", planted, counted=True)
+    environment["PYTHONPATH"] += os.pathsep + str(BENCHMARKS)
+    done = subprocess.run([sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True)
+    assert json.loads(done.stdout) == [{"rules.py": [7, 9]}, {}]
