@@ -92,6 +92,11 @@ class Picture:
         """Landmarks (N, L, 3), metres, in the world, of poses (N, D); all, in the order of `Body.landmark_names`, or those in `names`."""
         return self.body.points(poses, inverse(self.camera.T_camera_world) @ self.T_camera_base, names)
 
+    @cached_property
+    def every(self) -> NDArray[np.int64]:
+        """Indices of all shapes."""
+        return np.arange(len(self.body.parts))
+
     def empty(self) -> Bits:
         """Bits (ceil(W / 64), H) of an empty mask."""
         width, height = self.camera.size
@@ -99,7 +104,7 @@ class Picture:
 
     def draw(self, pose: ArrayLike, which: NDArray[np.int64] | None = None) -> Bits:
         """The silhouette of one pose (D,) as bits; of all shapes, or those in `which`."""
-        which = np.arange(len(self.body.parts)) if which is None else which
+        which = self.every if which is None else which
         bits = self.empty()
         self._compare(np.asarray(pose, float)[None], which, bits, bits, drawn=bits[None])
         return bits

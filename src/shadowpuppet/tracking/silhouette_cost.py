@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -68,7 +69,7 @@ class Observation:
         skipped = pack(pixels)
         return replace(self, silhouette=self.silhouette | skipped, ignore=self.ignore | skipped)
 
-    @property
+    @cached_property
     def area(self) -> int:
         """Pixels of the silhouette that count."""
         return count(self.silhouette & ~self.ignore)
@@ -119,6 +120,5 @@ class PartialCost:
 
 def silhouette_costs(picture: Picture, observation: Observation, poses: ArrayLike) -> Array:
     """Eq. 2 for whole poses (N, D): pixels (N,) in which the drawn body and the silhouette differ."""
-    every, fixed = np.arange(len(picture.body.parts)), observation.ignore
-    added = picture.added(np.ascontiguousarray(poses, float), every, observation.silhouette, fixed)
-    return count(fixed ^ observation.silhouette) + added.astype(float)
+    added = picture.added(np.ascontiguousarray(poses, float), picture.every, observation.silhouette, observation.ignore)
+    return observation.area + added.astype(float)

@@ -49,8 +49,6 @@ class Unexplained(NamedTuple):
 
     def beside(self, drawn: Mask) -> Mask | None:
         """Pixels (H, W) that are left out while the body is `drawn` (H, W); None if there are none."""
-        if not self.left_out.any():
-            return None
         out = self.left_out & ~near(drawn)
         return out if out.any() else None
 

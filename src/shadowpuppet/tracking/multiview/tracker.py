@@ -168,7 +168,7 @@ class MultiviewTracker:
                 keypoints: Sequence[Keypoints | None] = ()) -> MultiviewObservation:
         """The observation of a frame's masks (H, W) after `state`, without what is left out beside its pose. Arguments as in `step`."""
         also = self._with_arms(also, state, masks, codes)
-        beside = [None if each is None else each.beside(picture.mask(state.pose))
+        beside = [None if each is None or not each.left_out.any() else each.beside(picture.mask(state.pose))
                   for each, picture in zip(state.unexplained, self.views.pictures)]
         out = [None if pixels is None else pack(pixels) for pixels in beside]
         observation = MultiviewObservation(self.views, points, masks, also, out)
