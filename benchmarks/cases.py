@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,17 +17,17 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.metrics import UPPER_JOINTS, joint_errors
-from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.motion import JointTable, Motion, MotionBuilder
 from shadowpuppet.pipeline.findings.camera import survey_camera
 from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.options import Options, make_options
-from shadowpuppet.pipeline.person import fit_monocular
+from shadowpuppet.pipeline.person import ColouredMask, MonocularSubject, fit_monocular
 from shadowpuppet.pipeline.rig import Rig, open_rig
-from shadowpuppet.tracking.arm_colours import ColourCounts
-from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
+from shadowpuppet.pipeline.subject import joint_names, motion_frame
+from shadowpuppet.tracking.monocular.initialization import SizeFit
+from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
-from shadowpuppet.tracking.monocular.tracker import MonocularTracker
-from shadowpuppet.tracking.smoothing.both_ways import backward_share, near_profile
+from shadowpuppet.tracking.monocular.tracker import State
 
 ALIGNED = [name.replace("hand", "wrist") for name in UPPER_JOINTS]
 COLUMNS = ("mean", "sd", "plane", "depth", "far", "aligned", "shoulder", "elbow", "hand", "cost", "jitter", "ms")
@@ -86,18 +87,16 @@ class Case:
     def track(self, person: PersonEstimate, settings: MonocularSettings, rng: np.random.Generator) -> dict[str, float]:
         """Run a tracker, both ways if the settings say so, and measure it: millimetres, percent, pixels, m/s^2 and milliseconds a
         frame."""
-        picture = person.picture(self.camera, settings.body)
-        tracker = MonocularTracker(picture, settings)
-        poses, costs, spent, colours = _pass(tracker, rng, self.masks, self.codes)
-        if settings.both_ways and picture.body.hem is not None:
-            backward, others, more, _ = _pass(tracker, rng, self.masks[::-1], self.codes[::-1], colours)
-            names = picture.body.skeleton.dof_names
-            near = near_profile(names, poses) | near_profile(names, backward[::-1])
-            share = backward_share(self.times, costs, others[::-1], near, pixel_scale(self.camera.size))
-            poses, costs = (1 - share[:, None]) * poses + share[:, None] * backward[::-1], (1 - share) * costs + share * others[::-1]
+        rate = 1 / float(np.median(np.diff(self.times)))
+        subject = MonocularSubject.of(SizeFit(person, {}, {}, np.zeros((0, 0))), self.camera, settings, "", rate)
+        seen = [ColouredMask(mask, codes) for mask, codes in zip(self.masks, self.codes, strict=True)]
+        motion, spent, last = _pass(subject, rng, self.times, seen)
+        if subject.both_ways:
+            other, more, _ = _pass(subject.turned_back(last), rng, -self.times[::-1], seen[::-1])
+            motion, _ = subject.blended(motion, _reversed(other))
             spent += more
-        table = JointTable(self.times, picture.body.landmark_names, picture.points_world(poses))
-        return self.measure(table) | {"cost": float(np.nanmean(costs)), "ms": 1000 * spent / max(len(poses) - 1, 1)}
+        costs, number = motion.cost[motion.known], max(len(motion) - 1, 1)
+        return self.measure(motion.table) | {"cost": float(np.mean(costs)), "ms": 1000 * spent / number}
 
     def measure(self, table: JointTable) -> dict[str, float]:
         """Errors of joints against the truth, and how much the hands shake."""
@@ -112,16 +111,23 @@ class Case:
                       "aligned": aligned["aligned_mean_mm"], "jitter": jitter}
 
 
-def _pass(tracker: MonocularTracker, rng: np.random.Generator, masks: list[Mask], codes: list[ColourCode | None],
-          colours: ColourCounts | None = None) -> tuple[Array, Array, float, ColourCounts | None]:
-    """Poses (T, D) and costs (T,) of masks tracked in their order, the processor time (s) after the first, and the colours of the person's
-    arms; `colours`: what is known of them before."""
-    states = [tracker.start(rng, masks[0])._replace(colours=colours)]
-    start = time.process_time()  # what else the machine does is not counted
-    for mask, seen in zip(masks[1:], codes[1:]):
-        states.append(tracker.step(rng, states[-1], mask, codes=seen))
-    spent = time.process_time() - start
-    return np.array([state.pose for state in states]), np.array([state.cost for state in states]), spent, states[-1].colours
+def _pass(subject: MonocularSubject, rng: np.random.Generator, times: Array,
+          seen: Sequence[ColouredMask]) -> tuple[Motion, float, State | None]:
+    """The motion of what is seen at some times, tracked in this order, the processor time (s) after the first frame, and the last state."""
+    motion, spent = MotionBuilder(subject.body.name, subject.body.skeleton.dof_names, joint_names(subject.body)), 0.0
+    state = before = None
+    for n, (seconds, each) in enumerate(zip(times, seen, strict=True)):
+        start = time.process_time()  # what else the machine does is not counted
+        state = subject.next_state(rng, state, each)
+        spent += (time.process_time() - start) * (n > 0)
+        found, before = motion_frame(subject, float(seconds), state, each, before)
+        motion.append(found)
+    return motion.build(), spent, state
+
+
+def _reversed(motion: Motion) -> Motion:
+    """A motion tracked backward at times that are negative, in the order of the film."""
+    return replace(motion[::-1], times=-motion.times[::-1])
 
 
 def means(runs: list[dict[str, float]]) -> dict[str, float]:

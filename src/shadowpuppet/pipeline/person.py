@@ -36,13 +36,13 @@ from shadowpuppet.tracking.doubt.doubt import Doubt
 from shadowpuppet.tracking.doubt.limbs import doubtful_names
 from shadowpuppet.tracking.doubt.monocular import Before, MonocularDoubt
 from shadowpuppet.tracking.monocular.initialization import POSTURES, SizeFit, as_whole, find_person, fit_references
-from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
+from shadowpuppet.tracking.monocular.settings import MonocularSettings
 from shadowpuppet.tracking.monocular.size_search import PersonEstimate
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
 from shadowpuppet.tracking.particle_filter import Particles
-from shadowpuppet.tracking.smoothing.both_ways import blended
-from shadowpuppet.tracking.smoothing.facing import NEAR
+from shadowpuppet.tracking.smoothing.facing import NEAR, about_profile
 from shadowpuppet.tracking.smoothing.head_lean import head_lean
+from shadowpuppet.tracking.smoothing.likelier_pass import likelier
 from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
 from shadowpuppet.tracking.unexplained import Unexplained, left_out, look_beside, looks_in
 from shadowpuppet.video import Image
@@ -110,7 +110,8 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
 
     def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
         """See `TrackedSubject`."""
-        return blended(forward, backward, self.joints, pixel_scale(self.picture.camera.size))
+        alone = about_profile(forward) | about_profile(backward)
+        return likelier(forward, backward, self.joints, fronts=False, alone=alone)
 
     def beside_in(self, masks: Sequence[Mask]) -> BesideBody | None:
         """What the body leaves unexplained in most of some masks (H, W), in the poses that fit each best; None if nothing is."""

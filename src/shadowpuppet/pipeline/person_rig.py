@@ -52,7 +52,6 @@ from shadowpuppet.tracking.multiview.size_estimation import (
 from shadowpuppet.tracking.multiview.surface.visual_hull import NO_SURFACE, SurfacePoints, VisualHull
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles
-from shadowpuppet.tracking.people.front import PER_OVERLAP
 from shadowpuppet.tracking.smoothing.likelier_pass import likelier
 from shadowpuppet.tracking.unexplained import Unexplained, left_out, looks_in
 from shadowpuppet.video import Image
@@ -139,8 +138,7 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
 
     def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
         """See `TrackedSubject`."""
-        per_cost = PER_OVERLAP / MultiviewSettings().silhouettes  # the costs of passes differ by their overlaps
-        return likelier(forward, backward, per_cost, variance_model("pair").limits)
+        return likelier(forward, backward, self.joints, fronts=True, limits=variance_model("pair").limits)
 
     def doubt(self, state: MultiviewState, observation: HullObservation, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
         """Doubt about the estimate of a frame set."""

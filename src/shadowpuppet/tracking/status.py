@@ -7,6 +7,9 @@ ABSENT_AREA = 0.2
 LOST_OVERLAP, UNCERTAIN_OVERLAP = 0.5, 0.7
 """An overlap (intersection over union) below these is `lost` or `uncertain`; a cardbox model that fits overlaps by 0.8 to 0.9."""
 
+PER_OVERLAP = 180.0
+"""Log odds of a body that fits the silhouettes better by an overlap of 1 for a second."""
+
 
 def status_of(overlap: float) -> str:
     """`lost`, `uncertain` or `tracked`."""

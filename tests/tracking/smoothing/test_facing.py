@@ -9,7 +9,7 @@ import pytest
 from runs import body_of, root_of
 from smoothers import motion_of, smoother
 
-from shadowpuppet.tracking.smoothing.facing import LONGEST, mirror, turned_on, turns
+from shadowpuppet.tracking.smoothing.facing import BESIDE, LONGEST, about_profile, mirror, turned_on, turns
 
 NAME = "rounded"
 NAMES = body_of(NAME).skeleton.dof_names
@@ -160,3 +160,11 @@ def test_a_turn_is_smoothed_the_way_that_the_head_says():
     without, found = (np.abs(each.motion.joints - right).mean() for each in both)
     assert found < 0.3 * without
     assert both[1].reversed.any()
+
+
+def test_frames_about_a_profile():
+    poses = poses_of(0, 0)
+    poses[60, TWIST] = np.radians(-80)
+    motion = motion_of(NAME, poses, lost=[5])
+    np.testing.assert_array_equal(about_profile(motion), np.abs(np.arange(120) - 60) <= round(BESIDE * 30))
+    assert not about_profile(motion_of("anatomical", np.zeros((20, len(body_of("anatomical").skeleton.dofs))))).any()

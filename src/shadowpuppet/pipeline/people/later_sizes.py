@@ -11,9 +11,10 @@ from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.pipeline.people.state import Measured, PersonState, Shown
 from shadowpuppet.pipeline.person_rig import MultiviewSubject
 from shadowpuppet.tracking.people.evidence import draw_person
-from shadowpuppet.tracking.people.front import PER_OVERLAP, SETTLING
+from shadowpuppet.tracking.people.front import SETTLING
 from shadowpuppet.tracking.people.shared_sizes import Measure, measure, shows
 from shadowpuppet.tracking.people.tracker import at_pose, follow_turned, shows_side
+from shadowpuppet.tracking.status import PER_OVERLAP
 
 SETS, SECONDS = 8, 1.4
 """Number of frames in which a person is measured, and the least time from the first to the last of them."""

@@ -81,7 +81,7 @@ class MonocularSettings:
     patience: NonNegative = 1.0
     """Seconds after which a part of the silhouette that the body does not explain, such as a chair, is left out; 0: never."""
     both_ways: bool = True
-    """Track a film backward, too, and blend the two motions, where the run is smoothed and the body is an upper one. Takes the time of
+    """Track a film backward, too, and take the likelier pass, where the run is smoothed and the body is an upper one. Takes the time of
     tracking once more, but not that of the silhouettes."""
     ignore_legs: bool = True
     """Leave the silhouette below the waist, where the model has no legs, out of the cost; no effect for a whole body."""

@@ -18,13 +18,14 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.motion import MotionFrame
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.people.tracker import Share, follow_turned, shown_of, shows_side, turn_round
+from shadowpuppet.tracking.status import PER_OVERLAP
 
 KNOWN, MOST = 3.0, 6.0
 """Log odds from which on the front is known, 20 to 1; greatest log odds, so that evidence against them counts soon."""
 MEMORY = 1.0
 """Time (s) in which the odds fall to 1/e."""
-PER_OVERLAP, PER_METRE = 180.0, 7.0
-"""Log odds of a body that fits better by an overlap of 1 for a second; of a metre walked forwards."""
+PER_METRE = 7.0
+"""Log odds of a metre walked forwards."""
 PER_FRAME = 1.0
 """Greatest log odds that the overlaps of one frame add: it may be a bad one."""
 SETTLING = 0.4

@@ -34,6 +34,8 @@ LEAVING = 0.3
 """Time (s) from standing frontally to a profile."""
 FRONTAL, AROUND = np.radians(35), 0.4
 """Mean twist (rad) below which a person stands frontally, and the time (s) for which they do so before and after."""
+BESIDE = 0.5
+"""Time (s) before and after a profile that is about it."""
 CLEAR = 0.04
 """Median lean of the head (`head_lean`) in a profile, from which on it says which way the person faces; 0.08 to 0.13 of made people."""
 EDGE = np.radians(10)
@@ -61,6 +63,16 @@ def turns(motion: Motion, leans: Array | None = None) -> list[int]:
         if all(len(each) and each.mean() < FRONTAL for each in around):
             found.append(peak)
     return found
+
+
+def about_profile(motion: Motion) -> NDArray[np.bool_]:
+    """Frames (T,) of an upper body's motion in or about a profile: there two passes over a film may be mirror images of each other."""
+    if TWIST not in motion.dof_names:
+        return np.zeros(len(motion), bool)
+    near = np.abs(np.nan_to_num(motion.poses[:, motion.dof_names.index(TWIST)])) > NEAR
+    number = np.concatenate([[0], np.cumsum(near)])
+    first, last = (np.searchsorted(motion.times, motion.times + side * (BESIDE + 1e-6)) for side in (-1, 1))
+    return number[last] > number[first]
 
 
 class Faced(NamedTuple):

@@ -1,9 +1,8 @@
-"""A film of two cameras tracked forward and backward: in each frame the pass that is likelier, with the doubt that leaves.
+"""A film of one camera or two tracked forward and backward: in each frame the pass that is likelier, with the doubt that leaves.
 
-The silhouettes of two cameras allow a front and a back, and nearly the same seen from the left and the right. A pass that has taken a wrong
-one stays with it, and the other pass comes from the other side. Which of them is right is a hidden state with two values; its odds in a
-frame are those of all frames, before and after (Rabiner 1989, forward-backward procedure). Poses are not mixed: what is between two fronts
-is neither.
+Few silhouettes allow several poses: a front and a back, nearly the same seen from the left and the right, an arm before the trunk. A pass
+that has taken a wrong one stays with it, and the other pass comes from the other side. Which of them is right is a hidden state with two
+values; its odds in a frame are those of all frames, before and after (Rabiner 1989, forward-backward procedure).
 """
 
 from __future__ import annotations
@@ -12,47 +11,60 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import joints_of_limbs
 from shadowpuppet.motion.motion import Motion
-from shadowpuppet.tracking.smoothing.both_ways import mixed_deviations
+from shadowpuppet.tracking.smoothing.projection import Points
+from shadowpuppet.tracking.status import PER_OVERLAP
 
 
-def likelier(forward: Motion, backward: Motion, per_cost: float, limits: Mapping[str, float]) -> tuple[Motion, Array]:
-    """Two motions of the same frames as one, and the weight (T,), 0 or 1, of the backward one. `per_cost` as in `backward_odds`.
+def likelier(forward: Motion, backward: Motion, points: Points, *, fronts: bool, limits: Mapping[str, float] | None = None,
+             alone: NDArray[np.bool_] | None = None) -> tuple[Motion, Array]:
+    """Two motions of the same frames as one, and the weight (T,), 0 or 1, of the backward one, which is 1 where it is the likelier.
 
-    Deviations are those of a mixture about the likelier pass. A limb that is `tracked` in it is `uncertain` where the other place of it
-    takes a joint's deviation over the limit (m) for limbs of its kind (`limb_statuses`).
+    Args:
+        points: from poses (N, D) to the motion's joints (N, J, 3), metres, world.
+        fronts: whether the passes may face different ways. What is between two fronts is neither: then the other pass weighs the less the
+            further it is away. Else poses are means by weight.
+        limits: a limb that is `tracked` in the likelier pass is `uncertain` where the other place of it takes a joint's deviation over the
+            limit (m) for limbs of its kind (`limb_statuses`); None: statuses are those of the likelier pass.
+        alone: frames (T,) in which the forward pass alone counts, if it has a pose.
+
+    Deviations are those of a mixture.
     """
-    odds = backward_odds(forward, backward, per_cost)
+    odds, rare = backward_odds(forward, backward, np.zeros(len(forward), bool) if alone is None else alone)
     back, share = odds > 0, np.exp(-np.logaddexp(0.0, -odds))  # whether, and how probably, the backward pass is right
     chosen = {name: np.where(back.reshape(-1, *(1,) * (getattr(forward, name).ndim - 1)), getattr(backward, name), getattr(forward, name))
               for name in ("poses", "joints", "cost", "overlap", "status", "limb_status")}
-    ahead, behind = ((motion.poses - chosen["poses"] + np.pi) % (2 * np.pi) - np.pi for motion in (forward, backward))
-    pose_sd = mixed_deviations(share, (ahead, behind), (forward.pose_sd, backward.pose_sd), np.zeros_like(ahead))
-    joint_sd = mixed_deviations(share, (forward.joints, backward.joints), (forward.joint_sd, backward.joint_sd), chosen["joints"])
+    both, other = np.isfinite(odds), np.where(back, 1 - share, share) * (np.exp(-rare) if fronts else 1.0)
+    aside = _turned(np.where(back[:, None], forward.poses, backward.poses) - chosen["poses"])
+    chosen["poses"][both] += (other[:, None] * aside)[both]
+    chosen["joints"][both] = points(chosen["poses"][both])
+    ahead, behind = (_turned(motion.poses - chosen["poses"]) for motion in (forward, backward))
+    pose_sd = _deviations(share, (ahead, behind), (forward.pose_sd, backward.pose_sd))
+    ahead, behind = (motion.joints - chosen["joints"] for motion in (forward, backward))
+    joint_sd = _deviations(share, (ahead, behind), (forward.joint_sd, backward.joint_sd))
     radius = np.sqrt((joint_sd**2).sum(2))
     for n, (limb, own) in enumerate(joints_of_limbs(forward.joint_names).items()):
-        over = np.isfinite(odds) & (radius[:, own].max(1) > limits[limb.rpartition("_")[2]])
+        over = both & (radius[:, own].max(1) > (limits or {}).get(limb.rpartition("_")[2], np.inf))
         chosen["limb_status"][over & (chosen["limb_status"][:, n] == "tracked"), n] = "uncertain"
     return replace(forward, pose_sd=pose_sd, joint_sd=joint_sd, **chosen), back.astype(float)
 
 
-def backward_odds(forward: Motion, backward: Motion, per_cost: float) -> Array:
-    """Log odds (T,) that the backward pass is right, by the costs of all frames; infinite where only one pass has a pose.
-
-    `per_cost`: log odds of a pass whose body costs less by 1 m^2 for a second. A change from one pass to the other is the rarer the further
-    their joints are apart in units of their stated deviations.
-    """
+def backward_odds(forward: Motion, backward: Motion, alone: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Log odds (T,) that the backward pass is right, by the overlaps of all frames, infinite where only one pass has a pose, or the forward
+    pass counts `alone` (T,); and how far the passes are apart (T,), nats: half the mean square of their joints' distances in units of
+    their stated deviations. The right pass changes the more rarely the further they are apart."""
     ahead, behind = forward.known, backward.known
-    both = ahead & behind
+    both = ahead & behind & ~alone
     step = float(np.median(np.diff(forward.times))) if len(forward) > 1 else 0.0
-    told = np.where(both, per_cost * step * (forward.cost - backward.cost), 0.0)
-    apart = (backward.joints - forward.joints) ** 2 / (forward.joint_sd**2 + backward.joint_sd**2)
-    change = -np.where(both, apart.sum(2).mean(1) / 2, 0.0)
-    before, after = _carried(told, change), _carried(told[::-1], change[::-1])[::-1]
-    return np.where(both, before + told + after, np.where(behind & ~ahead, np.inf, -np.inf))
+    told = np.where(both, PER_OVERLAP * step * (backward.overlap - forward.overlap), 0.0)
+    squares = (backward.joints - forward.joints) ** 2 / (forward.joint_sd**2 + backward.joint_sd**2)
+    apart = np.where(both, squares.sum(2).mean(1) / 2, 0.0)
+    before, after = _carried(told, -apart), _carried(told[::-1], -apart[::-1])[::-1]
+    return np.where(both, before + told + after, np.where(behind & ~ahead, np.inf, -np.inf)), apart
 
 
 def _carried(told: Array, change: Array) -> Array:
@@ -63,3 +75,16 @@ def _carried(told: Array, change: Array) -> Array:
         odds, rare = out[t - 1] + told[t - 1], (change[t - 1] + change[t]) / 2
         out[t] = np.logaddexp(odds, rare) - np.logaddexp(0.0, odds + rare)
     return out
+
+
+def _turned(poses: Array) -> Array:
+    """Differences of poses (T, D), angles by the shorter way round."""
+    return (poses + np.pi) % (2 * np.pi) - np.pi
+
+
+def _deviations(share: Array, aside: tuple[Array, Array], sds: tuple[Array, Array]) -> Array:
+    """Deviations (T, ...) of a mixture of two values that are `aside` of the mean (T, ...), with their own; `share` (T,) of the second.
+    Where one has all of the weight the other may be unknown."""
+    share = share.reshape(-1, *(1,) * (sds[0].ndim - 1))
+    first, second = (sd**2 + value**2 for sd, value in zip(sds, aside))
+    return np.sqrt(np.where(share == 0, first, np.where(share == 1, second, (1 - share) * first + share * second)))
