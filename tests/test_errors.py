@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shlex
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shadowpuppet.errors import LONGEST, FormatError, ShadowPuppetWarning, did_you_mean, extra_command, one_line, warn
+from shadowpuppet.errors import LONGEST, FormatError, ShadowPuppetWarning, did_you_mean, extra_command, held_warnings, one_line, warn
 from shadowpuppet.live.sources import known_person
 from shadowpuppet.pipeline.options import Options
 
@@ -57,3 +58,19 @@ def test_a_warning_names_the_caller_s_line():
             called()
         assert caught[0].filename == __file__
         assert caught[0].lineno == called.__code__.co_firstlineno
+
+
+def test_warnings_that_are_held_back_are_given_if_the_work_fails():
+    def fail() -> None:
+        with held_warnings():
+            warn("second")
+            raise ValueError("work")
+
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        with held_warnings() as held:
+            warn("first")
+        assert (held, said) == (["first"], [])
+        with pytest.raises(ValueError, match="work"):
+            fail()
+    assert [str(each.message) for each in said] == ["second"]

@@ -8,7 +8,9 @@ import shlex
 import stat
 import sys
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -175,8 +177,30 @@ WRAPPERS = ("contextlib", "numpy")
 """Packages whose decorators lie between the caller's code and ours."""
 
 
+_held: ContextVar[list[str] | None] = ContextVar("held", default=None)
+
+
+@contextmanager
+def held_warnings() -> Iterator[list[str]]:
+    """Context in which the warnings of `warn` on this thread are kept back, in the list that it gives, so that work shared out to threads
+    warns in its own order. If the work fails they are given at once."""
+    held = list[str]()
+    token = _held.set(held)
+    try:
+        yield held
+    except BaseException:
+        _held.reset(token)
+        for message in held:
+            warn(message)
+        raise
+    _held.reset(token)
+
+
 def warn(message: str) -> None:
     """Warn of a problem that does not stop the work. The warning names the line that led to it in the caller's own code, not here."""
+    if (held := _held.get()) is not None:
+        held.append(message)
+        return
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in (__name__.partition(".")[0], *WRAPPERS):
         frame, level = frame.f_back, level + 1

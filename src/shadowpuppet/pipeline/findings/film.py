@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from shadowpuppet.camera.mask import Mask
+from shadowpuppet.errors import held_warnings, warn
 from shadowpuppet.motion.metrics import overlap
 from shadowpuppet.pipeline.findings.look import FilmLook, FilmSurvey, Survey
 from shadowpuppet.pipeline.findings.opening import opening_of
@@ -74,11 +75,22 @@ def films_again(survey: Survey, options: Options, beside: Sequence[BesideBody | 
 
 
 def _each(rig: Rig, work: Callable[..., FilmSurvey], *every: Sequence[object]) -> tuple[FilmSurvey, ...]:
-    """The work on each camera's footage, with one item of each sequence: on several cores if there are several cameras."""
+    """The work on each camera's footage, with one item of each sequence: on several cores if there are several cameras, and with warnings
+    in the order of the cameras."""
     if not rig.is_multiview:
         return tuple(map(work, rig.footage, *every))
+
+    def held(*items: object) -> tuple[FilmSurvey, list[str]]:
+        with held_warnings() as warnings:
+            return work(*items), warnings
+
     with one_opencv_thread(), ThreadPoolExecutor(usable_cores(), "look") as pool:
-        return tuple(pool.map(work, rig.footage, *every))
+        found = list[FilmSurvey]()
+        for survey, warnings in pool.map(held, rig.footage, *every):
+            found.append(survey)
+            for message in warnings:
+                warn(message)
+    return tuple(found)
 
 
 def of_several(film: FilmSurvey) -> FilmSurvey:
