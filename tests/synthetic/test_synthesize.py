@@ -36,7 +36,7 @@ from shadowpuppet.synthetic import (
     synthesize,
 )
 from shadowpuppet.synthetic.movement.gestures import GESTURES
-from shadowpuppet.synthetic.recording import perform
+from shadowpuppet.synthetic.recording import covered_places, perform
 from shadowpuppet.synthetic.spec_changes import SpecChanges, apply_changes, parse_gestures
 from shadowpuppet.synthetic.spec_file import SPEC_HEADER, seed_of
 from shadowpuppet.synthetic.truth import SOLES
@@ -523,3 +523,16 @@ def test_training_and_bystanders_of_a_part(tmp_path):
     assert len(read_joints(folder / "truth.csv").times) == 3
     assert len(read_joints(folder / "training.csv").times) == 7
     assert len(frames(folder / "people" / "cam1.mkv")) == 3
+
+
+def test_a_motion_of_the_whole_body_is_filmed_from_where_the_feet_are_seen():
+    walks = apply_changes(SpecChanges(motion="walk 3"), Spec())
+    (view,) = walks.cameras
+    places = covered_places(walks)
+    feet = np.column_stack([places, np.zeros(len(places))])
+    rows = view.camera().project(feet)[:, 1]
+    assert rows.max() < view.size[1]
+    assert rows.max() > 0.8 * view.size[1]  # and no farther away
+    assert [each.distance for each in apply_changes(SpecChanges(motion="reach 3"), Spec()).cameras] == [2.0]
+    assert [each.distance for each in apply_changes(SpecChanges(motion="walk 3", distance=3.0), Spec()).cameras] == [3.0]
+    assert apply_changes(SpecChanges(motion="walk 3", cameras=3), Spec()).ring is not None

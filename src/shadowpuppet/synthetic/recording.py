@@ -90,13 +90,12 @@ def perform(spec: Spec, rng: np.random.Generator) -> tuple[Array, PosedBody]:
     return times, _figure(spec, times + spec.begin, rng)
 
 
-def covered_middle(spec: Spec) -> Array:
-    """The middle (2,) of the floor that all people cover, world, metres."""
+def covered_places(spec: Spec) -> Array:
+    """The places (T, 2) on the floor of all people, from time to time, world, metres: the person's first place is its origin."""
     slow, rng = replace(spec, rate=MIDDLE_RATE, frames=None), np.random.default_rng(spec.seed)
     times, figure = perform(slow, rng)
     figures = [figure, *(_bystander(slow, someone, len(times), rng, figure) for someone in spec.scene.bystanders)]
-    places = np.concatenate([each.joints[:, 0, :2] for each in figures])
-    return (places.min(0) + places.max(0)) / 2
+    return np.concatenate([each.joints[:, 0, :2] for each in figures])
 
 
 def feet_of(spec: Spec, times: Array, figure: PosedBody, rng: np.random.Generator) -> Soles:

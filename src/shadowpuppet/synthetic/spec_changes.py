@@ -15,10 +15,12 @@ from shadowpuppet.errors import SettingsError
 from shadowpuppet.settings import STRICT
 from shadowpuppet.synthetic.company import RING_FOV, RING_RADIUS, RING_RADIUS_EACH, SEED, Together, members
 from shadowpuppet.synthetic.faults.fault import faults_from_text
+from shadowpuppet.synthetic.movement.gestures import GESTURES
 from shadowpuppet.synthetic.movement.resting import PostureName
 from shadowpuppet.synthetic.movement.script import SHORTEST, Gesture
 from shadowpuppet.synthetic.person.mannequin import STATURES, Mannequin
 from shadowpuppet.synthetic.spec import Spec, spec_from, spec_values
+from shadowpuppet.synthetic.viewpoint import Viewpoint
 from shadowpuppet.synthetic.walls import WallStyle
 
 OCCLUDERS: dict[str, dict[str, float]] = {"table": {"ahead": 0.75}, "chair": {"ahead": 0.7, "left": -0.25, "turn_deg": 180},
@@ -54,7 +56,8 @@ class SpecChanges:
     ring_radius: float | None = None
     """Distance of the ring's cameras from the person's place, metres."""
     distance: float | None = None
-    """Distance of a single camera from the person's place, metres."""
+    """Distance of a single camera from the person's place, metres. Without it a motion of the whole body is filmed from where the floor is
+    seen wherever the person goes."""
     camera_height: float | None = None
     """Height of the cameras over the floor, metres."""
     fov: float | None = None
@@ -133,16 +136,30 @@ def apply_changes(changes: SpecChanges, spec: Spec, source: str = "flags") -> Sp
     if "second_person" in said:
         values["scene"]["bystanders"] = [SECOND_PERSONS[said["second_person"]]]
     changed = spec_from(values, source)
+    moves = "motion" in said and any(gesture.motion not in GESTURES for gesture in changed.motion)
+    if moves and "distance" not in said and [view.distance for view in changed.cameras] == [Viewpoint().distance]:
+        return _showing_feet(changed)
     return _around_all(changed) if said.get("around_all") else changed
 
 
 def _around_all(spec: Spec) -> Spec:
     """The spec with its ring of cameras around the middle of the floor that all people cover."""
-    from shadowpuppet.synthetic.recording import covered_middle
+    from shadowpuppet.synthetic.recording import covered_places
 
     assert spec.ring is not None
-    x, y = covered_middle(spec).round(3).tolist()
+    places = covered_places(spec)
+    x, y = ((places.min(0) + places.max(0)) / 2).round(3).tolist()
     return replace(spec, ring=replace(spec.ring, ahead=-y, left=x))
+
+
+def _showing_feet(spec: Spec) -> Spec:
+    """The spec with its one camera so far away that it sees the floor wherever the people go."""
+    from shadowpuppet.synthetic.recording import covered_places
+
+    (view,), (width, height) = spec.cameras, spec.cameras[0].size
+    nearest = view.height / (np.tan(np.radians(view.fov_deg / 2)) * height / width)
+    reach = float(np.linalg.norm(covered_places(spec), axis=1).max())
+    return replace(spec, cameras=(replace(view, distance=round(float(nearest) + reach, 1)),))
 
 
 def _gather(values: dict[str, Any], said: dict[str, Any], spec: Spec, source: str) -> None:
