@@ -43,7 +43,7 @@ from shadowpuppet.tracking.particle_filter import Particles
 from shadowpuppet.tracking.smoothing.facing import NEAR, about_profile
 from shadowpuppet.tracking.smoothing.head_lean import head_lean
 from shadowpuppet.tracking.smoothing.likelier_pass import likelier
-from shadowpuppet.tracking.status import UNCERTAIN_OVERLAP
+from shadowpuppet.tracking.status import PER_OVERLAP, UNCERTAIN_OVERLAP
 from shadowpuppet.tracking.unexplained import Unexplained, left_out, look_beside, looks_in
 from shadowpuppet.video import Image
 
@@ -111,7 +111,8 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
     def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
         """See `TrackedSubject`."""
         alone = about_profile(forward) | about_profile(backward)
-        return likelier(forward, backward, self.joints, fronts=False, alone=alone)
+        told = PER_OVERLAP * (backward.overlap - forward.overlap)
+        return likelier(forward, backward, told, self.joints, fronts=False, alone=alone)
 
     def beside_in(self, masks: Sequence[Mask]) -> BesideBody | None:
         """What the body leaves unexplained in most of some masks (H, W), in the poses that fit each best; None if nothing is."""

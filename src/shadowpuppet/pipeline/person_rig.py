@@ -53,6 +53,7 @@ from shadowpuppet.tracking.multiview.surface.visual_hull import NO_SURFACE, Surf
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.particle_filter import Particles
 from shadowpuppet.tracking.smoothing.likelier_pass import likelier
+from shadowpuppet.tracking.status import PER_OVERLAP
 from shadowpuppet.tracking.unexplained import Unexplained, left_out, looks_in
 from shadowpuppet.video import Image
 
@@ -138,7 +139,8 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
 
     def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
         """See `TrackedSubject`."""
-        return likelier(forward, backward, self.joints, fronts=True, limits=variance_model("pair").limits)
+        told = PER_OVERLAP / MultiviewSettings().silhouettes * (forward.cost - backward.cost)  # costs differ by overlaps
+        return likelier(forward, backward, told, self.joints, fronts=True, limits=variance_model("pair").limits)
 
     def doubt(self, state: MultiviewState, observation: HullObservation, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
         """Doubt about the estimate of a frame set."""

@@ -137,7 +137,7 @@ def apply_changes(changes: SpecChanges, spec: Spec, source: str = "flags") -> Sp
         values["scene"]["bystanders"] = [SECOND_PERSONS[said["second_person"]]]
     changed = spec_from(values, source)
     moves = "motion" in said and any(gesture.motion not in GESTURES for gesture in changed.motion)
-    if moves and "distance" not in said and [view.distance for view in changed.cameras] == [Viewpoint().distance]:
+    if moves and changed.ring is None and "distance" not in said and [view.distance for view in changed.cameras] == [Viewpoint().distance]:
         return _showing_feet(changed)
     return _around_all(changed) if said.get("around_all") else changed
 

@@ -31,8 +31,12 @@ def passing(headings, overlaps, lost=()):
     return replace(motion_of(NAME, poses, lost), overlap=np.broadcast_to(np.asarray(overlaps, float), FRAMES).copy())
 
 
+def told_by(forward, backward):
+    return PER_OVERLAP * (backward.overlap - forward.overlap)
+
+
 def blended(forward, backward, fronts=True, limits=LIMITS, alone=None):
-    return likelier(forward, backward, points, fronts=fronts, limits=limits, alone=alone)
+    return likelier(forward, backward, told_by(forward, backward), points, fronts=fronts, limits=limits, alone=alone)
 
 
 def test_the_pass_that_fits_better_over_the_film_is_taken_in_every_frame():
@@ -46,7 +50,8 @@ def test_the_pass_that_fits_better_over_the_film_is_taken_in_every_frame():
 
 
 def test_odds_are_those_of_all_frames():
-    odds, apart = backward_odds(passing(0.0, 0.8), passing(np.pi, 0.801), NONE)
+    forward, backward = passing(0.0, 0.8), passing(np.pi, 0.801)
+    odds, apart = backward_odds(forward, backward, told_by(forward, backward), NONE)
     np.testing.assert_allclose(odds, PER_OVERLAP * 1e-3 * FRAMES / RATE, rtol=0.05)
     assert apart.min() > 10
 

@@ -17,14 +17,14 @@ from shadowpuppet.geometry import Array
 from shadowpuppet.motion.limbs import joints_of_limbs
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.tracking.smoothing.projection import Points
-from shadowpuppet.tracking.status import PER_OVERLAP
 
 
-def likelier(forward: Motion, backward: Motion, points: Points, *, fronts: bool, limits: Mapping[str, float] | None = None,
+def likelier(forward: Motion, backward: Motion, told: Array, points: Points, *, fronts: bool, limits: Mapping[str, float] | None = None,
              alone: NDArray[np.bool_] | None = None) -> tuple[Motion, Array]:
     """Two motions of the same frames as one, and the weight (T,), 0 or 1, of the backward one, which is 1 where it is the likelier.
 
     Args:
+        told: log odds (T,) of a second of each frame's evidence that the backward pass is right.
         points: from poses (N, D) to the motion's joints (N, J, 3), metres, world.
         fronts: whether the passes may face different ways. What is between two fronts is neither: then the other pass weighs the less the
             further it is away. Else poses are means by weight.
@@ -34,7 +34,7 @@ def likelier(forward: Motion, backward: Motion, points: Points, *, fronts: bool,
 
     Deviations are those of a mixture.
     """
-    odds, rare = backward_odds(forward, backward, np.zeros(len(forward), bool) if alone is None else alone)
+    odds, rare = backward_odds(forward, backward, told, np.zeros(len(forward), bool) if alone is None else alone)
     back, share = odds > 0, np.exp(-np.logaddexp(0.0, -odds))  # whether, and how probably, the backward pass is right
     chosen = {name: np.where(back.reshape(-1, *(1,) * (getattr(forward, name).ndim - 1)), getattr(backward, name), getattr(forward, name))
               for name in ("poses", "joints", "cost", "overlap", "status", "limb_status")}
@@ -53,14 +53,14 @@ def likelier(forward: Motion, backward: Motion, points: Points, *, fronts: bool,
     return replace(forward, pose_sd=pose_sd, joint_sd=joint_sd, **chosen), back.astype(float)
 
 
-def backward_odds(forward: Motion, backward: Motion, alone: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Log odds (T,) that the backward pass is right, by the overlaps of all frames, infinite where only one pass has a pose, or the forward
-    pass counts `alone` (T,); and how far the passes are apart (T,), nats: half the mean square of their joints' distances in units of
-    their stated deviations. The right pass changes the more rarely the further they are apart."""
+def backward_odds(forward: Motion, backward: Motion, told: Array, alone: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Log odds (T,) that the backward pass is right, by what all frames have `told` (T,), infinite where only one pass has a pose, or the
+    forward pass counts `alone` (T,); and how far the passes are apart (T,), nats: half the mean square of their joints' distances in units
+    of their stated deviations. The right pass changes the more rarely the further they are apart."""
     ahead, behind = forward.known, backward.known
     both = ahead & behind & ~alone
     step = float(np.median(np.diff(forward.times))) if len(forward) > 1 else 0.0
-    told = np.where(both, PER_OVERLAP * step * (backward.overlap - forward.overlap), 0.0)
+    told = np.where(both, step * told, 0.0)
     squares = (backward.joints - forward.joints) ** 2 / (forward.joint_sd**2 + backward.joint_sd**2)
     apart = np.where(both, squares.sum(2).mean(1) / 2, 0.0)
     before, after = _carried(told, -apart), _carried(told[::-1], -apart[::-1])[::-1]
