@@ -152,7 +152,9 @@ def test_the_version_is_reported_by_the_module_too():
 @pytest.mark.parametrize(("tokens", "said"), [
     (["trac"], 'Unknown command "trac"'),
     (["track", "my", "film.mp4"], "found 'film.mp4' after all that the command takes; a path with blanks belongs in quotes"),
-    (["track"], "requires an argument"),
+    (["track"], "error: track: found no RECORDING; `shadowpuppet track --help` has examples"),
+    (["track", "here", "--output"], "parameter --output requires an argument"),
+    (["completion"], "error: completion: found no SHELL; expected bash, fish, powershell, zsh"),
     (["track", "here", "--overlya"], "Unknown option: --overlya. Did you mean --overlay"),
     (["track", "here", "--tracker.arm.particle", "3"], "Did you mean --tracker.arm.particles"),
     (["track", "here", "--height", "1,75"], '--height: unable to convert "1,75" into float. Write 1.75.'),

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
-from cyclopts import App, CycloptsError, Group, UnusedCliTokensError
+from cyclopts import App, CycloptsError, Group, MissingArgumentError, UnusedCliTokensError
 
-from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, is_out_of_memory, one_line, reason
+from shadowpuppet.errors import INTERRUPTED, MISTAKE, ShadowPuppetError, choices, is_out_of_memory, one_line, reason
 from shadowpuppet.output import say, say_text
 from shadowpuppet.removed import refuse_tokens
 
@@ -115,5 +115,9 @@ def _told(error: Exception) -> str:
     if isinstance(error, UnusedCliTokensError):
         words = error.unused_tokens or ()
         return one_line(f"found {' '.join(words)!r} after all that the command takes; a path with blanks belongs in quotes")
+    if isinstance(error, MissingArgumentError) and error.argument is not None and error.keyword is None and not error.argument.tokens:
+        command, possible = " ".join(error.command_chain or ()), error.argument.get_choices()
+        expected = f"expected {choices(possible)}" if possible else f"`shadowpuppet {command} --help` has examples"
+        return f"{command}: found no {error.argument.name}; {expected}"
     comma = re.search(r'unable to convert "(-?\d+),(\d+)" into float', str(error))
     return one_line(error) + (f" Write {comma[1]}.{comma[2]}." if comma else "")

@@ -465,8 +465,8 @@ def test_quiet_is_quiet(shell, recording):
 
 
 @pytest.mark.parametrize(("tokens", "said"), [
-    (["batch"], "requires an argument"),
-    (["batch", "here"], "requires an argument"),
+    (["batch"], "batch: found no RECORDINGS; `shadowpuppet batch --help` has examples"),
+    (["batch", "here"], "batch: found no --output; `shadowpuppet batch --help` has examples"),
     (["batch", "here", "-o", "out", "--seeds", "many"], "flags: seeds: found 'many', expected numbers from 0 on"),
     (["batch", "here", "-o", "out", "--config", "none.toml"], "none.toml: cannot be read"),
     (["batch", "here", "here", "-o", "out"], "recordings: found here twice"),
