@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.metrics import UPPER_JOINTS, joint_errors
-from shadowpuppet.motion.motion import JointTable, Motion, MotionBuilder
+from shadowpuppet.motion.motion import JointTable, Motion, MotionBuilder, MotionFrame
 from shadowpuppet.pipeline.findings.camera import survey_camera
 from shadowpuppet.pipeline.findings.look import Survey
 from shadowpuppet.pipeline.options import Options, make_options
@@ -90,10 +90,11 @@ class Case:
         rate = 1 / float(np.median(np.diff(self.times)))
         subject = MonocularSubject.of(SizeFit(person, {}, {}, np.zeros((0, 0))), self.camera, settings, "", rate)
         seen = [ColouredMask(mask, codes) for mask, codes in zip(self.masks, self.codes, strict=True)]
-        motion, spent, last = _pass(subject, rng, self.times, seen)
+        frames, spent, last = _pass(subject, rng, self.times, seen)
+        motion = _motion(subject, frames)
         if subject.both_ways:
-            other, more, _ = _pass(subject.turned_back(last), rng, -self.times[::-1], seen[::-1])
-            motion, _ = subject.blended(motion, _reversed(other))
+            frames, more, _ = _pass(subject.turned_back(last), rng, -self.times[::-1], seen[::-1])
+            motion, _ = subject.blended(motion, _motion(subject, reversed(frames)))
             spent += more
         costs, number = motion.cost[motion.known], max(len(motion) - 1, 1)
         return self.measure(motion.table) | {"cost": float(np.mean(costs)), "ms": 1000 * spent / number}
@@ -112,22 +113,24 @@ class Case:
 
 
 def _pass(subject: MonocularSubject, rng: np.random.Generator, times: Array,
-          seen: Sequence[ColouredMask]) -> tuple[Motion, float, State | None]:
+          seen: Sequence[ColouredMask]) -> tuple[list[MotionFrame], float, State | None]:
     """The motion of what is seen at some times, tracked in this order, the processor time (s) after the first frame, and the last state."""
-    motion, spent = MotionBuilder(subject.body.name, subject.body.skeleton.dof_names, joint_names(subject.body)), 0.0
+    frames, spent = list[MotionFrame](), 0.0
     state = before = None
     for n, (seconds, each) in enumerate(zip(times, seen, strict=True)):
         start = time.process_time()  # what else the machine does is not counted
         state = subject.next_state(rng, state, each)
         spent += (time.process_time() - start) * (n > 0)
         found, before = motion_frame(subject, float(seconds), state, each, before)
-        motion.append(found)
-    return motion.build(), spent, state
+        frames.append(found)
+    return frames, spent, state
 
 
-def _reversed(motion: Motion) -> Motion:
-    """A motion tracked backward at times that are negative, in the order of the film."""
-    return replace(motion[::-1], times=-motion.times[::-1])
+def _motion(subject: MonocularSubject, frames: Iterable[MotionFrame]) -> Motion:
+    builder = MotionBuilder(subject.body.name, subject.body.skeleton.dof_names, joint_names(subject.body))
+    for found in frames:
+        builder.append(found._replace(time=abs(found.time)))
+    return builder.build()
 
 
 def means(runs: list[dict[str, float]]) -> dict[str, float]:
