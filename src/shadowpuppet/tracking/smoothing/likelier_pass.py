@@ -19,29 +19,29 @@ from shadowpuppet.motion.motion import Motion
 from shadowpuppet.tracking.smoothing.projection import Points
 
 
-def likelier(forward: Motion, backward: Motion, told: Array, points: Points, *, fronts: bool, limits: Mapping[str, float] | None = None,
+def likelier(forward: Motion, backward: Motion, told: Array, points: Points, *, averaged: bool, limits: Mapping[str, float] | None = None,
              alone: NDArray[np.bool_] | None = None) -> tuple[Motion, Array]:
     """Two motions of the same frames as one, and the weight (T,), 0 or 1, of the backward one, which is 1 where it is the likelier.
 
     Args:
         told: log odds (T,) of a second of each frame's evidence that the backward pass is right.
         points: from poses (N, D) to the motion's joints (N, J, 3), metres, world.
-        fronts: whether the passes may face different ways. What is between two fronts is neither: then the other pass weighs the less the
-            further it is away. Else poses are means by weight.
+        averaged: whether poses are means by weight; else those of the likelier pass, as what is between two fronts is neither.
         limits: a limb that is `tracked` in the likelier pass is `uncertain` where the other place of it takes a joint's deviation over the
             limit (m) for limbs of its kind (`limb_statuses`); None: statuses are those of the likelier pass.
         alone: frames (T,) in which the forward pass alone counts, if it has a pose.
 
     Deviations are those of a mixture.
     """
-    odds, rare = backward_odds(forward, backward, told, np.zeros(len(forward), bool) if alone is None else alone)
+    odds = backward_odds(forward, backward, told, np.zeros(len(forward), bool) if alone is None else alone)
     back, share = odds > 0, np.exp(-np.logaddexp(0.0, -odds))  # whether, and how probably, the backward pass is right
     chosen = {name: np.where(back.reshape(-1, *(1,) * (getattr(forward, name).ndim - 1)), getattr(backward, name), getattr(forward, name))
               for name in ("poses", "joints", "cost", "overlap", "status", "limb_status")}
-    both, other = np.isfinite(odds), np.where(back, 1 - share, share) * (np.exp(-rare) if fronts else 1.0)
-    aside = _turned(np.where(back[:, None], forward.poses, backward.poses) - chosen["poses"])
-    chosen["poses"][both] += (other[:, None] * aside)[both]
-    chosen["joints"][both] = points(chosen["poses"][both])
+    both = np.isfinite(odds)
+    if averaged:
+        aside = _turned(np.where(back[:, None], forward.poses, backward.poses) - chosen["poses"])
+        chosen["poses"][both] += (np.where(back, 1 - share, share)[:, None] * aside)[both]
+        chosen["joints"][both] = points(chosen["poses"][both])
     ahead, behind = (_turned(motion.poses - chosen["poses"]) for motion in (forward, backward))
     pose_sd = _deviations(share, (ahead, behind), (forward.pose_sd, backward.pose_sd))
     ahead, behind = (motion.joints - chosen["joints"] for motion in (forward, backward))
@@ -53,18 +53,18 @@ def likelier(forward: Motion, backward: Motion, told: Array, points: Points, *, 
     return replace(forward, pose_sd=pose_sd, joint_sd=joint_sd, **chosen), back.astype(float)
 
 
-def backward_odds(forward: Motion, backward: Motion, told: Array, alone: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Log odds (T,) that the backward pass is right, by what all frames have `told` (T,), infinite where only one pass has a pose, or the
-    forward pass counts `alone` (T,); and how far the passes are apart (T,), nats: half the mean square of their joints' distances in units
-    of their stated deviations. The right pass changes the more rarely the further they are apart."""
+def backward_odds(forward: Motion, backward: Motion, told: Array, alone: NDArray[np.bool_]) -> Array:
+    """Log odds (T,) that the backward pass is right, by what all frames have `told` (T,); infinite where only one pass has a pose, or the
+    forward pass counts `alone` (T,). A change from one pass to the other is the rarer the further their joints are apart in units of their
+    stated deviations."""
     ahead, behind = forward.known, backward.known
     both = ahead & behind & ~alone
     step = float(np.median(np.diff(forward.times))) if len(forward) > 1 else 0.0
     told = np.where(both, step * told, 0.0)
     squares = (backward.joints - forward.joints) ** 2 / (forward.joint_sd**2 + backward.joint_sd**2)
-    apart = np.where(both, squares.sum(2).mean(1) / 2, 0.0)
-    before, after = _carried(told, -apart), _carried(told[::-1], -apart[::-1])[::-1]
-    return np.where(both, before + told + after, np.where(behind & ~ahead, np.inf, -np.inf)), apart
+    change = -np.where(both, squares.sum(2).mean(1) / 2, 0.0)
+    before, after = _carried(told, change), _carried(told[::-1], change[::-1])[::-1]
+    return np.where(both, before + told + after, np.where(behind & ~ahead, np.inf, -np.inf))
 
 
 def _carried(told: Array, change: Array) -> Array:
