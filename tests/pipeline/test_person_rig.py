@@ -140,7 +140,7 @@ def test_the_same_seed_is_the_same_run(recording, run, tmp_path):
 
 def test_films_of_two_cameras_are_tracked_both_ways_unless_keypoints_show_the_front(untaught, tmp_path, monkeypatch):
     passes = []
-    monkeypatch.setattr(person_rig, "likelier", lambda *given: passes.append(given[:2]) or likelier(*given))
+    monkeypatch.setattr(person_rig, "likelier", lambda *given, **more: passes.append(given[:2]) or likelier(*given, **more))
     pair = QUICK | {"camera": "cam1,cam3"}
     found = track_recording(untaught, tmp_path / "run", make_options(pair))
     ((forward, backward),) = passes

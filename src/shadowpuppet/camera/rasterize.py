@@ -94,7 +94,7 @@ class Picture:
 
     @cached_property
     def every(self) -> NDArray[np.int64]:
-        """Indices of all shapes."""
+        """Indices (S,) of all shapes."""
         return np.arange(len(self.body.parts))
 
     def empty(self) -> Bits:
