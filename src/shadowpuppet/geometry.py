@@ -188,11 +188,16 @@ def clear_order(rotations: Array) -> str:
     return ORDERS[0] if room[0] >= MIN_MARGIN else ORDERS[int(np.argmax(room))]
 
 
+def wrapped(angles: Array) -> Array:
+    """Angles (...), radians, wrapped to [-pi, pi)."""
+    return (np.asarray(angles, float) + np.pi) % (2 * np.pi) - np.pi
+
+
 def smoothest_path(candidates: Array, own: Array, wraps: NDArray[np.bool_]) -> Array:
     """The path (T, 3) through candidates (T, K, 3) of least squared steps plus own costs (T, K) (Viterbi 1967). `wraps` (3,): which axes
     are periodic."""
     steps = candidates[1:, None, :] - candidates[:-1, :, None]
-    steps = np.where(wraps, (steps + np.pi) % (2 * np.pi) - np.pi, steps)
+    steps = np.where(wraps, wrapped(steps), steps)
     between = (steps**2).sum(3)
     cost, came = own[0], np.zeros(candidates.shape[:2], np.int64)
     for t in range(1, len(candidates)):

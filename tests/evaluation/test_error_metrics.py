@@ -22,8 +22,8 @@ from shadowpuppet.evaluation.error_metrics import (
     pose_losses,
     world_difference,
 )
-from shadowpuppet.evaluation.joint_angles import dof_errors, wrapped
-from shadowpuppet.geometry import rotation_from_vector
+from shadowpuppet.evaluation.joint_angles import dof_errors
+from shadowpuppet.geometry import rotation_from_vector, wrapped
 from shadowpuppet.motion.metrics import LIMB_JOINTS, joint_errors
 from shadowpuppet.motion.motion import JointTable, Motion
 

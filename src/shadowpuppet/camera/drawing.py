@@ -223,7 +223,7 @@ def _of_quads(picture: Picture, pose: Array) -> list[_Piece]:
 def _of_hulls(picture: Picture, pose: Array) -> list[_Piece]:
     """Pieces of hulls: their outlines, brighter toward the middle."""
     body, T = picture.body, picture.transforms(pose[None])
-    corners, counts = picture.polygons(T, np.arange(len(body.parts)))
+    corners, counts = picture.polygons(T, picture.every)
     T = T[0, body.shapes.joints]
     depths = (np.einsum("sej,sej->se", T[..., 2, :3], body.shapes.arrays[0]) + T[..., 2, 3]).mean(1)
     pieces = []

@@ -7,7 +7,7 @@ import numpy as np
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.evaluation.error_metrics import angle_errors
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, wrapped
 from shadowpuppet.motion.inverse_kinematics import fit_poses
 from shadowpuppet.motion.motion import JointTable, Motion
 from shadowpuppet.motion.synchronization import match
@@ -75,11 +75,6 @@ def _nearest_rotation(matrix: Array) -> Array:
     """The rotation (3, 3) nearest to a sum of rotations."""
     u, _, vt = np.linalg.svd(matrix)
     return u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
-
-
-def wrapped(angles: Array) -> Array:
-    """Angles, radians, wrapped to [-pi, pi)."""
-    return (np.asarray(angles, float) + np.pi) % (2 * np.pi) - np.pi
 
 
 def _local_rotations(skeleton: Skeleton, poses: Array) -> Array:

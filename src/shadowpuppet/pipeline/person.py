@@ -111,8 +111,8 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
     def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
         """See `TrackedSubject`."""
         alone = about_profile(forward) | about_profile(backward)
-        told = PER_OVERLAP * (backward.overlap - forward.overlap)
-        return likelier(forward, backward, told, self.joints, averaged=True, alone=alone)
+        evidence = PER_OVERLAP * (backward.overlap - forward.overlap)
+        return likelier(forward, backward, evidence, self.joints, averaged=True, alone=alone)
 
     def beside_in(self, masks: Sequence[Mask]) -> BesideBody | None:
         """What the body leaves unexplained in most of some masks (H, W), in the poses that fit each best; None if nothing is."""

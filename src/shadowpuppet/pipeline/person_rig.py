@@ -139,8 +139,8 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
 
     def blended(self, forward: Motion, backward: Motion) -> tuple[Motion, Array]:
         """See `TrackedSubject`."""
-        told = PER_OVERLAP / MultiviewSettings().silhouettes * (forward.cost - backward.cost)  # costs differ by overlaps
-        return likelier(forward, backward, told, self.joints, averaged=False, limits=variance_model("pair").limits)
+        evidence = PER_OVERLAP / MultiviewSettings().silhouettes * (forward.cost - backward.cost)  # costs differ by overlaps
+        return likelier(forward, backward, evidence, self.joints, averaged=False, limits=variance_model("pair").limits)
 
     def doubt(self, state: MultiviewState, observation: HullObservation, seconds: float, before: Before | None) -> tuple[Doubt, Before]:
         """Doubt about the estimate of a frame set."""

@@ -31,12 +31,12 @@ def passing(headings, overlaps, lost=()):
     return replace(motion_of(NAME, poses, lost), overlap=np.broadcast_to(np.asarray(overlaps, float), FRAMES).copy())
 
 
-def told_by(forward, backward):
+def evidence_of(forward, backward):
     return PER_OVERLAP * (backward.overlap - forward.overlap)
 
 
 def blended(forward, backward, averaged=False, limits=LIMITS, alone=None):
-    return likelier(forward, backward, told_by(forward, backward), points, averaged=averaged, limits=limits, alone=alone)
+    return likelier(forward, backward, evidence_of(forward, backward), points, averaged=averaged, limits=limits, alone=alone)
 
 
 def test_the_pass_that_fits_better_over_the_film_is_taken_in_every_frame():
@@ -45,13 +45,13 @@ def test_the_pass_that_fits_better_over_the_film_is_taken_in_every_frame():
     worse[20:25] -= 0.07  # in some frames it fits worse: people do not turn round in a frame
     both, share = blended(forward, replace(backward, overlap=worse))
     assert share.tolist() == [1.0] * FRAMES
-    np.testing.assert_allclose(both.joints, backward.joints, atol=1e-9)
+    np.testing.assert_array_equal(both.joints, backward.joints)
     assert (both.limb_status == "tracked").all()
 
 
 def test_odds_are_those_of_all_frames():
     forward, backward = passing(0.0, 0.8), passing(np.pi, 0.801)
-    odds = backward_odds(forward, backward, told_by(forward, backward), NONE)
+    odds = backward_odds(forward, backward, evidence_of(forward, backward), NONE)
     np.testing.assert_allclose(odds, PER_OVERLAP * 1e-3 * FRAMES / RATE, rtol=0.05)
 
 
@@ -62,7 +62,7 @@ def test_each_half_is_taken_from_the_pass_that_is_right_there_where_both_meet():
     both, share = blended(forward, backward)
     assert share[:25].tolist() == [1.0] * 25
     assert share[35:].tolist() == [0.0] * 25
-    np.testing.assert_allclose(both.poses[:25], backward.poses[:25], atol=1e-6)
+    np.testing.assert_array_equal(both.poses[:25], backward.poses[:25])
     np.testing.assert_array_equal(both.overlap[35:], forward.overlap[35:])
 
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.models import WHOLE, make_body
 from shadowpuppet.body.skeleton import SIDES
-from shadowpuppet.evaluation.joint_angles import wrapped
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, wrapped
 from shadowpuppet.io.intervals import HALF_WIDTH
 from shadowpuppet.io.motion.opensim.coordinates import coordinates
 from shadowpuppet.io.motion.table import dof_unit

@@ -97,8 +97,7 @@ class LinearBodies:
         picture = Picture(self.body, camera, T_camera_base)
         offsets, *arrays = (np.ascontiguousarray(np.tensordot(sizes, slope, 1), float) for slope in self.slopes)
         offsets[:, 0, [0, 2]] += shift
-        every = np.arange(len(self.body.parts))
-        added = picture.added(poses, every, observation.silhouette, observation.ignore, measures=(offsets, *arrays))
+        added = picture.added(poses, picture.every, observation.silhouette, observation.ignore, measures=(offsets, *arrays))
         return observation.area + added.astype(float)
 
 

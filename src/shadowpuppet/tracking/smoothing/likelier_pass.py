@@ -13,18 +13,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shadowpuppet.geometry import Array
+from shadowpuppet.geometry import Array, wrapped
 from shadowpuppet.motion.limbs import joints_of_limbs
 from shadowpuppet.motion.motion import Motion
 from shadowpuppet.tracking.smoothing.projection import Points
 
 
-def likelier(forward: Motion, backward: Motion, told: Array, points: Points, *, averaged: bool, limits: Mapping[str, float] | None = None,
-             alone: NDArray[np.bool_] | None = None) -> tuple[Motion, Array]:
+def likelier(forward: Motion, backward: Motion, evidence: Array, points: Points, *, averaged: bool,
+             limits: Mapping[str, float] | None = None, alone: NDArray[np.bool_] | None = None) -> tuple[Motion, Array]:
     """Two motions of the same frames as one, and the weight (T,), 0 or 1, of the backward one, which is 1 where it is the likelier.
 
     Args:
-        told: log odds (T,) of a second of each frame's evidence that the backward pass is right.
+        evidence: log odds (T,), per second, of each frame alone that the backward pass is right.
         points: from poses (N, D) to the motion's joints (N, J, 3), metres, world.
         averaged: whether poses are means by weight; else those of the likelier pass, as what is between two fronts is neither.
         limits: a limb that is `tracked` in the likelier pass is `uncertain` where the other place of it takes a joint's deviation over the
@@ -33,53 +33,49 @@ def likelier(forward: Motion, backward: Motion, told: Array, points: Points, *, 
 
     Deviations are those of a mixture.
     """
-    odds = backward_odds(forward, backward, told, np.zeros(len(forward), bool) if alone is None else alone)
+    odds = backward_odds(forward, backward, evidence, np.zeros(len(forward), bool) if alone is None else alone)
     back, share = odds > 0, np.exp(-np.logaddexp(0.0, -odds))  # whether, and how probably, the backward pass is right
     chosen = {name: np.where(back.reshape(-1, *(1,) * (getattr(forward, name).ndim - 1)), getattr(backward, name), getattr(forward, name))
               for name in ("poses", "joints", "cost", "overlap", "status", "limb_status")}
     both = np.isfinite(odds)
     if averaged:
-        aside = _turned(np.where(back[:, None], forward.poses, backward.poses) - chosen["poses"])
+        aside = wrapped(np.where(back[:, None], forward.poses, backward.poses) - chosen["poses"])
         chosen["poses"][both] += (np.where(back, 1 - share, share)[:, None] * aside)[both]
         chosen["joints"][both] = points(chosen["poses"][both])
-    ahead, behind = (_turned(motion.poses - chosen["poses"]) for motion in (forward, backward))
+    ahead, behind = (wrapped(motion.poses - chosen["poses"]) for motion in (forward, backward))
     pose_sd = _deviations(share, (ahead, behind), (forward.pose_sd, backward.pose_sd))
     ahead, behind = (motion.joints - chosen["joints"] for motion in (forward, backward))
     joint_sd = _deviations(share, (ahead, behind), (forward.joint_sd, backward.joint_sd))
-    radius = np.sqrt((joint_sd**2).sum(2))
-    for n, (limb, own) in enumerate(joints_of_limbs(forward.joint_names).items()):
-        over = both & (radius[:, own].max(1) > (limits or {}).get(limb.rpartition("_")[2], np.inf))
-        chosen["limb_status"][over & (chosen["limb_status"][:, n] == "tracked"), n] = "uncertain"
+    if limits is not None:
+        radius = np.sqrt((joint_sd**2).sum(2))
+        for n, (limb, own) in enumerate(joints_of_limbs(forward.joint_names).items()):
+            over = both & (radius[:, own].max(1) > limits[limb.rpartition("_")[2]])
+            chosen["limb_status"][over & (chosen["limb_status"][:, n] == "tracked"), n] = "uncertain"
     return replace(forward, pose_sd=pose_sd, joint_sd=joint_sd, **chosen), back.astype(float)
 
 
-def backward_odds(forward: Motion, backward: Motion, told: Array, alone: NDArray[np.bool_]) -> Array:
-    """Log odds (T,) that the backward pass is right, by what all frames have `told` (T,); infinite where only one pass has a pose, or the
-    forward pass counts `alone` (T,). A change from one pass to the other is the rarer the further their joints are apart in units of their
-    stated deviations."""
+def backward_odds(forward: Motion, backward: Motion, evidence: Array, alone: NDArray[np.bool_]) -> Array:
+    """Log odds (T,) that the backward pass is right, given the `evidence` (T,) of all frames; infinite where only one pass has a pose, or
+    the forward pass counts `alone` (T,). A switch between the passes is less probable the larger the distance of their joints is relative
+    to the stated deviations."""
     ahead, behind = forward.known, backward.known
     both = ahead & behind & ~alone
     step = float(np.median(np.diff(forward.times))) if len(forward) > 1 else 0.0
-    told = np.where(both, step * told, 0.0)
+    own = np.where(both, step * evidence, 0.0)
     squares = (backward.joints - forward.joints) ** 2 / (forward.joint_sd**2 + backward.joint_sd**2)
-    change = -np.where(both, squares.sum(2).mean(1) / 2, 0.0)
-    before, after = _carried(told, change), _carried(told[::-1], change[::-1])[::-1]
-    return np.where(both, before + told + after, np.where(behind & ~ahead, np.inf, -np.inf))
+    switch = -np.where(both, squares.sum(2).mean(1) / 2, 0.0)
+    before, after = _carried(own, switch), _carried(own[::-1], switch[::-1])[::-1]
+    return np.where(both, before + own + after, np.where(behind & ~ahead, np.inf, -np.inf))
 
 
-def _carried(told: Array, change: Array) -> Array:
-    """Log odds (T,) of each frame given all earlier frames, from every frame's evidence `told` (T,) and the log odds `change` (T,) that the
-    right pass changes there."""
-    out = np.zeros(len(told))
-    for t in range(1, len(told)):
-        odds, rare = out[t - 1] + told[t - 1], (change[t - 1] + change[t]) / 2
+def _carried(own: Array, switch: Array) -> Array:
+    """Log odds (T,) of each frame given the frames before it (forward recursion), from the log odds of each frame alone, `own` (T,), and
+    the log odds of a switch there, `switch` (T,)."""
+    out = np.zeros(len(own))
+    for t in range(1, len(own)):
+        odds, rare = out[t - 1] + own[t - 1], (switch[t - 1] + switch[t]) / 2
         out[t] = np.logaddexp(odds, rare) - np.logaddexp(0.0, odds + rare)
     return out
-
-
-def _turned(poses: Array) -> Array:
-    """Differences of poses (T, D), angles by the shorter way round."""
-    return (poses + np.pi) % (2 * np.pi) - np.pi
 
 
 def _deviations(share: Array, aside: tuple[Array, Array], sds: tuple[Array, Array]) -> Array:
