@@ -3,7 +3,8 @@
     python benchmarks/keypoints.py [FILM...] [--detector made] [--seeds 1] [-o build/keypoints]
 
 The films are made: walks toward two cameras, two cameras far apart, a chair that is not in the empty scene before four cameras, and those
-of `--rings`, three to eight cameras without training motion. `--detector made`: numbers with errors as a detector makes them
+of `--rings`, three to eight cameras without training motion. `--one`: upper and whole bodies before one camera, by silhouettes and by both
+(`proving_ground.py`, `whole_people.py`, with these columns). `--detector made`: numbers with errors as a detector makes them
 (`detector.py`); `mediapipe`: what `shadowpuppet keypoints` finds in the films. Errors are means over shoulders, elbows, wrists, hips, knees
 and ankles, mm, a lost joint counting 500; triangulated points are smoothed at 6 Hz. `ms`: time a frame set of tracking and hull.
 """
@@ -21,16 +22,20 @@ from pathlib import Path
 
 import numpy as np
 import smallest
+import whole_people
 from detector import DETECTORS, detected, detected_together
+from proving_ground import made
+from whole_people import Figures
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.keypoints.film_keypoints import film_keypoints, write_keypoints
+from shadowpuppet.io.motion.motion_files import read_truth
 from shadowpuppet.io.motion.table import read_joints
 from shadowpuppet.motion.motion import JointTable
 from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.rig import Rig, open_rig
 from shadowpuppet.pipeline.track import track_recording
-from shadowpuppet.synthetic import Gesture, Mannequin, Scene, Spec, Viewpoint, named_specs, proving_rings, synthesize
+from shadowpuppet.synthetic import Gesture, Mannequin, Scene, Spec, Viewpoint, named_specs, proving_ground, proving_rings, synthesize
 from shadowpuppet.tracking.keypoints.triangulation import triangulated
 from shadowpuppet.tracking.smoothing.butterworth import filtered
 
@@ -126,6 +131,27 @@ def measured(recording: Path, out: Path, seeds: int, detector: str) -> dict[str,
     return {row: tuple(np.mean(some, axis=0).tolist()) for row, some in values.items()}
 
 
+def one_camera(names: Sequence[str], out: Path, detector: str) -> Iterator[str]:
+    """Lines of the table of one camera, for films of some names, all without, or folders of recordings: the run's figures by silhouettes
+    and by both."""
+    whole = {film.spec.name: film for film in whole_people.films()}
+    upper = {spec.name: n for n, spec in enumerate(proving_ground())}
+    found = dict[tuple[str, str], list[Figures]]()
+    yield whole_people.HEAD.replace("| film |", "| film, evidence |")
+    for name in names or [*upper, *whole]:
+        path, kind = (whole_people.made(whole[name], out), "whole bodies") if name in whole else (Path(name), "upper bodies")
+        if name in upper:
+            (path,) = made(out, [name])
+        known, truth = with_keypoints(path, detector), read_truth(path / "truth.csv")
+        for row in ("silhouettes", "both"):
+            options = make_options({"evidence": ROWS[row]} | ({"body": whole[name].body} if name in whole else {}))
+            figures = whole_people.figures_of(track_recording(known, out / "runs" / f"{path.name}-{row}", options).motion, truth)
+            found.setdefault((kind, row), []).append(figures)
+            yield figures.line(f"{path.name}, {row}")
+    for (kind, row), figures in found.items():
+        yield whole_people.mean_of(figures).line(f"mean of {len(figures)} {kind}, {row}")
+
+
 def _smallest(folder: Path) -> Sequence[object]:
     recording = smallest.make(folder / "ring", smallest.RING)
     return [recording, "-o", folder]
@@ -136,10 +162,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("films", nargs="*", help="names of made films, or folders of recordings with truth.csv; all made ones without")
     parser.add_argument("--rings", action="store_true", help="the rings of the proving ground")
+    parser.add_argument("--one", action="store_true", help="before one camera")
     parser.add_argument("--detector", default="made", choices=("made", "mediapipe"))
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("-o", "--out", type=Path, default=ROOT / "build" / "keypoints")
     args = smallest.parse(parser, _smallest)
+    if args.one:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            for line in one_camera(args.films, args.out, args.detector):
+                print(line, flush=True)
+        return
     specs = {spec.name: spec for spec in films(args.rings)}
     head = ["film", *ROWS, *(f"ms, {row}" for row, evidence in ROWS.items() if evidence)]
     print("| " + " | ".join(head) + " |\n" + "|---" * len(head) + "|")

@@ -165,7 +165,7 @@ class Figures(NamedTuple):
         """The row as Markdown, with the figures `before` in brackets."""
         def cell(key: str) -> str:
             now, then = getattr(self, key), None if before is None else getattr(before, key)
-            text = f"{now:.0f}" if key in ("upper", "legs") else f"{now:.1f}"
+            text = "" if np.isnan(now) else f"{now:.0f}" if key in ("upper", "legs") else f"{now:.1f}"
             return text if then is None else f"{text} ({then:.0f})"
 
         return f"| {name} | " + " | ".join(map(cell, self._fields)) + " |"
@@ -181,7 +181,11 @@ def measured(film: postures.Film, folder: Path, body: str | None, out: Path | No
     truth, options = read_truth(path / "truth.csv"), make_options({"body": body} if body else {})
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        motion = track_recording(path, out or path / "run", options).motion
+        return figures_of(track_recording(path, out or path / "run", options).motion, truth)
+
+
+def figures_of(motion: Motion, truth: JointTable) -> Figures:
+    """A run's motion compared with the truth."""
     names = [name for name in motion.table.names if name in truth.names]
     errors = joint_errors(motion.table, truth, names)
     mirrored = JointTable(truth.times, tuple(map(_other, truth.names)), truth.positions)
@@ -209,7 +213,8 @@ def _doubtful(motion: Motion, names: tuple[str, ...]) -> NDArray[np.bool_]:
     return np.array([[status[column] != "tracked" for column in columns] for status in motion.limb_status])
 
 
-def _mean(figures: Sequence[Figures]) -> Figures:
+def mean_of(figures: Sequence[Figures]) -> Figures:
+    """Means of several films."""
     return Figures(*np.nanmean(np.array(figures), axis=0).tolist())
 
 
@@ -240,7 +245,7 @@ def main() -> None:
         lines.append(found[film.name].line(film.name, before.get(film.name)))
         print(lines[-1], flush=True)
     then = [before[name] for name in found if name in before]
-    lines.append(_mean(list(found.values())).line("mean", _mean(then) if then else None))
+    lines.append(mean_of(list(found.values())).line("mean", mean_of(then) if then else None))
     print(lines[-1])
     if args.markdown is not None:
         into_page(args.markdown, TABLES[args.pairs], "\n".join(lines))

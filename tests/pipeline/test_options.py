@@ -15,7 +15,6 @@ from shadowpuppet.threads import one_blas_thread
     ({"facing": "away", "initialization": {"sweeps": 1}}, True, "several cameras: facing, initialization.sweeps"),
     ({"multiview": {"particles": 30}, "prior": "walk.npz"}, False, "one camera: prior, multiview.particles"),
     ({"appearance": False, "training": {"regions": 9}}, False, "one camera: appearance, training.regions"),
-    ({"evidence": "silhouettes,keypoints"}, False, "one camera: evidence"),
 ])  # fmt: skip
 def test_what_has_no_effect_is_named(values, several, named):
     options = make_options(values)
@@ -24,7 +23,8 @@ def test_what_has_no_effect_is_named(values, several, named):
         check_used(options, several)
 
 
-@pytest.mark.parametrize("values", [{}, {"body": "anatomical"}, {"seed": 3, "smooth": "off", "overlay": True, "max_size": 320}])
+@pytest.mark.parametrize("values", [{}, {"body": "anatomical"}, {"evidence": "silhouettes,keypoints"},
+                                    {"seed": 3, "smooth": "off", "overlay": True, "max_size": 320}])  # fmt: skip
 @pytest.mark.parametrize("several", [False, True])
 def test_nothing_is_said_of_what_has_an_effect(values, several):
     check_used(make_options(values), several)

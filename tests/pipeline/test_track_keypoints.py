@@ -99,11 +99,16 @@ def test_one_cameras_scale_is_a_guess_without_a_height(walk):
     assert not known.findings
 
 
-def test_keypoints_that_one_cameras_silhouettes_do_without_are_named(rig_recording, walk, tmp_path):
+def test_one_camera_tracks_by_silhouettes_and_keypoints_together(rig_recording, walk, tmp_path):
     both = made.copied(walk, tmp_path / "both")
     made.copied(rig_recording / "background", both / "background")
-    found = look_at(both, make_options({"camera": "cam1", "height": 1.75}))
-    assert "keypoints not used: try --evidence keypoints" in [each.short for each in found.findings]
+    options = {"camera": "cam1", "height": 1.75, "body": "anatomical"}
+    assert not [each for each in look_at(both, make_options(options)).findings if "keypoints" in each.short]
+    found = {evidence: track_recording(both, tmp_path / str(evidence), make_options(options | {"evidence": evidence})).motion
+             for evidence in (None, "silhouettes,keypoints", "silhouettes")}  # fmt: skip
+    assert np.array_equal(found[None].poses, found["silhouettes,keypoints"].poses, equal_nan=True)
+    assert set(found["silhouettes"].status) == {"tracked"}
+    assert np.mean(found[None].status == "uncertain") > 0.5  # the film shows another walk than the keypoints
 
 
 def test_a_wrong_scale_is_said_and_a_hopeless_one_refused(rig_recording, walk, tmp_path):

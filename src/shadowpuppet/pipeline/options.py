@@ -37,7 +37,7 @@ WITH_PRESETS: dict[str, tuple[Mapping[str, Any], Callable[..., Any]]] = {
     "tracker": (PRESETS, make_settings), "multiview": (MULTIVIEW_PRESETS, make_multiview_settings),
     "initialization": (INITIALIZATION_PRESETS, make_initialization)}  # fmt: skip
 """For each table of settings that has presets: these, and the function that makes the settings."""
-OF_ONE, OF_SEVERAL = ("distance", "facing", "tracker", "initialization"), ("prior", "appearance", "evidence", "multiview", "training")
+OF_ONE, OF_SEVERAL = ("distance", "facing", "tracker", "initialization"), ("prior", "appearance", "multiview", "training")
 """Options that matter with one camera only, and with several only."""
 OF_SILHOUETTES = ("background", "masks", "region", "silhouette")
 """Options that matter only where silhouettes are evidence."""
@@ -97,8 +97,8 @@ class Options:
     masks: bool = False
     """Use the recording's ready silhouettes (masks/) instead of segmenting the film."""
     evidence: Literal["silhouettes", "keypoints", "silhouettes,keypoints"] | None = None
-    """What a person is tracked by: silhouettes; a detector's keypoints (keypoints/), which need no empty scene; or both, with several
-    cameras only. By default by both where there are keypoints, with one camera and with the papers' presets by silhouettes."""
+    """What a person is tracked by: silhouettes; a detector's keypoints (keypoints/), which need no empty scene; or both. By default by
+    both where there are keypoints, with the papers' presets by silhouettes."""
     people: Annotated[int, Field(ge=1, le=6)] | None = None
     """Number of people to follow, 1 to 6, with one camera or live 1; by default they are counted. Anybody else is ignored."""
     label: Annotated[int, Field(ge=0)] | None = None

@@ -15,6 +15,7 @@ from shadowpuppet.body.upper_body import TWIST
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import ColourCode
 from shadowpuppet.camera.drawing import overlay_frame
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask, Seen, may_be_person
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.errors import HARMFUL, NOTED, RUINOUS, Finding, RecordingError, SilhouetteError, TrackingError
@@ -82,6 +83,8 @@ class ColouredMask(NamedTuple):
     """The silhouette (H, W)."""
     codes: ColourCode | None
     """Coarse colours; None: not known."""
+    keypoints: Keypoints | None = None
+    """What a detector found; None without."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -100,7 +103,7 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
         """A subject from a fit, for a film of `rate` frames/s; `source`: where the sizes come from, in words."""
         picture = fit.guess.picture(camera, settings.body)
         person = Person(fit.guess.sizes, round(fit.guess.height, 4), source)
-        tracker = MonocularTracker(picture, settings, looks=looks_in(settings.patience, rate))
+        tracker = MonocularTracker(picture, settings, rate=rate, looks=looks_in(settings.patience, rate))
         return cls(body=picture.body, person=person, fit=fit, tracker=tracker, summary={})
 
     @property
@@ -132,10 +135,10 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
         return self.tracker.picture
 
     def observe(self, seen: Seen) -> ColouredMask:
-        """The camera's mask and its colours."""
+        """The camera's mask, its colours and keypoints."""
         (mask,) = seen.masks
         assert mask is not None
-        return ColouredMask(mask, seen.codes[0] if seen.codes else None)
+        return ColouredMask(mask, seen.codes[0] if seen.codes else None, seen.keypoints[0] if seen.keypoints else None)
 
     def next_state(self, rng: np.random.Generator, state: State | None, observation: ColouredMask) -> State | None:
         """The tracker's state after a mask; None before the first mask that is not empty, and, for a filter that never searches again,
@@ -143,9 +146,9 @@ class MonocularSubject(TrackedSubject[State, ColouredMask, Before]):
         if state is None:
             if not observation.mask.any():
                 return None
-            found = self.tracker.start(rng, observation.mask)._replace(colours=self.colours)
+            found = self.tracker.start(rng, observation.mask, keypoints=observation.keypoints)._replace(colours=self.colours)
             return found if found.status != "absent" or self.tracker.settings.recover else None
-        return self.tracker.step(rng, state, observation.mask, codes=observation.codes)
+        return self.tracker.step(rng, state, observation.mask, codes=observation.codes, keypoints=observation.keypoints)
 
     def turned_back(self, state: State | None) -> Self:
         """See `TrackedSubject`; it knows the arms' colours."""

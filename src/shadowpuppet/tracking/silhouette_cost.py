@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,26 @@ from shadowpuppet.geometry import Array
 
 Cost = Callable[[Array], Array]
 """Function from poses (N, D) to costs (N,)."""
+
+
+class Landmarked(Protocol):
+    """Keypoints of one person in a picture."""
+
+    def surprises(self, poses: Array, without: Sequence[str] = ()) -> Array:
+        """Surprise (N,), nats, of the keypoints given poses (N, D); `without`: joints whose landmarks do not count."""
+        ...
+
+    def against(self, pose: Array) -> float:
+        """Log odds that the person faces the other way than in a pose (D,)."""
+        ...
+
+    def missed(self, pose: Array) -> dict[str, float]:
+        """Of each limb that has landmarks the share of them that no keypoint shows near a pose (D,)."""
+        ...
+
+    def support(self, pose: Array) -> float:
+        """Share of the keypoints near a pose (D,)."""
+        ...
 
 
 class Soles(NamedTuple):
@@ -41,6 +61,8 @@ class Observation:
 
     soles: Soles | None = None
     """A whole person's soles; None if they do not count."""
+    keypoints: Landmarked | None = None
+    """A detector's joints."""
 
     @classmethod
     def of(cls, mask: ArrayLike, ignore: ArrayLike | None = None, also: Cost | None = None) -> Observation:

@@ -1,6 +1,8 @@
-"""Status of an estimate, from the overlap of the drawn model and the silhouettes."""
+"""Status of an estimate, from the overlap of the drawn model and the silhouettes, and from keypoints near it."""
 
 from __future__ import annotations
+
+import numpy as np
 
 ABSENT_AREA = 0.2
 """If the silhouette is smaller than this share of the drawn body's area, the person is absent."""
@@ -11,6 +13,18 @@ PER_OVERLAP = 180.0
 """Log odds of a body that fits the silhouettes better by an overlap of 1 for a second."""
 
 
-def status_of(overlap: float) -> str:
-    """`lost`, `uncertain` or `tracked`."""
-    return "lost" if overlap < LOST_OVERLAP else "uncertain" if overlap < UNCERTAIN_OVERLAP else "tracked"
+CONTRADICTION = 0.4
+"""Difference of overlap and support from which on silhouettes and keypoints are of different things."""
+
+
+def agreement_of(overlap: float, support: float = np.nan) -> float:
+    """The overlap, or the share of the keypoints that support the estimate where that is greater: furniture in silhouettes and a poor
+    detector are no loss. NaN: not known."""
+    return float(np.fmax(overlap, support))
+
+
+def status_of(overlap: float, support: float = np.nan) -> str:
+    """`lost`, `uncertain` or `tracked`, by `agreement_of`."""
+    agreement = agreement_of(overlap, support)
+    sure = agreement >= UNCERTAIN_OVERLAP and not abs(overlap - support) > CONTRADICTION
+    return "lost" if agreement < LOST_OVERLAP else "tracked" if sure else "uncertain"

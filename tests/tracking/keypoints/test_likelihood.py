@@ -10,7 +10,7 @@ from benchmarks.detector import EXACT, USUAL, detected
 from shadowpuppet.body.jacobian import make_chain, place_one
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.keypoints.definitions import ARMS, Landmarks, landmarks_of
-from shadowpuppet.tracking.keypoints.likelihood import BOX, EXCHANGED, NU, exchanges, surprises
+from shadowpuppet.tracking.keypoints.likelihood import BOX, EXCHANGED, NU, exchanges, odds_turned, surprises
 from shadowpuppet.tracking.keypoints.sights import NO_SIGHTS, Sights, sights_of
 from shadowpuppet.tracking.multiview.refinement.keypoint_rays import pull_to_rays
 
@@ -55,6 +55,32 @@ def test_the_surprise_is_that_of_the_plain_formula():
     found = surprises(places(poses), sights, MARKS)
     assert found == pytest.approx([plain(points, sights, MARKS) for points in places(poses)], rel=1e-9)
     assert found.argmin() == 1
+
+
+@pytest.mark.kernels
+def test_before_one_camera_the_distance_may_be_left_to_others():
+    poses = actor.walk(actor.body().skeleton, 4)
+    sights = seen(poses[1]).only(seen(poses[1]).cameras == 0)
+    view, points = sights.rays.mean(0), places(poses)
+    moved = []
+    for each in points:
+        off = np.einsum("mai,mi->ma", sights.across, each[sights.landmarks] - sights.origins)
+        weights = (1 - sights.outlying) / (sights.squares + (off**2).sum(1) / NU)
+        along = sights.across @ view
+        moved.append(each - (weights * (off * along).sum(1)).sum() / (weights * (along**2).sum(1)).sum() * view)
+    kept = points.copy()
+    found = surprises(points, sights, MARKS, anywhere=True)
+    assert found == pytest.approx([plain(each, sights, MARKS) for each in moved], rel=1e-9)
+    assert np.array_equal(points, kept)
+    assert surprises(points[:1] - 0.3 * view, sights, MARKS, anywhere=True) == pytest.approx(found[:1], abs=0.5)
+
+
+def test_all_sides_exchanged_speak_for_the_other_front_by_a_bounded_amount():
+    pose = actor.walk(actor.body().skeleton, 1)[0]
+    sights = seen(pose).only(seen(pose).cameras == 0)
+    points, most = places(pose)[0], np.log((1 - EXCHANGED) / EXCHANGED)
+    assert odds_turned(points, sights, MARKS) == pytest.approx(-most, abs=0.01)
+    assert odds_turned(points[MARKS.mirrored], sights, MARKS) == pytest.approx(most, abs=0.01)
 
 
 def test_keypoints_on_something_else_cost_a_bounded_amount():

@@ -108,9 +108,6 @@ def known_scale(footage: Footage) -> str:
 def _doubts(look: Look, footage: Footage, whole: bool) -> list[Finding]:
     """What is in doubt before anything is tracked; `whole`: whether a whole body is, whose soles show the distance."""
     doubts, subject = list[Finding](), footage.recording.subject
-    if footage.keypoints is not None:
-        doubts.append(Finding("keypoints are not used beside one camera's silhouettes: --evidence keypoints tracks the whole person by "
-                              "them alone, without an empty scene", "keypoints not used: try --evidence keypoints", NOTED))
     if not look.calibrated:
         doubts.append(Finding.of("no calibration: the camera is taken for level, with a field of view of {fov:.0f} degrees and no "
                                  "distortion; depths and the world's axes are as good as that; give a calibration.toml",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -97,10 +97,9 @@ class MonocularDoubt:
         observation = self.tracker.observe(mask, state.pose) if known is None else known
         images = self._mirrors.images(state.pose, points, observation)
         shares = self._shares(state.pose, points, mask, unpack(observation.ignore, mask.shape[1]))
-        arms = None if state.observation is None else state.observation.arms
-        for limb, share in ({} if arms is None else self.tracker.arm_colours.mismatch(arms, state.pose)).items():
+        for limb, share in self._not_shown(state):
             hidden, unexplained, outside, cut = shares[limb]
-            shares[limb] = (hidden * share, unexplained, outside, cut)  # its colours show an arm before the trunk
+            shares[limb] = (hidden * share, unexplained, outside, cut)
         columns = np.array([shares.get(limb_of(name), (0.0,) * 4) for name in self.names]) * lever[:, None]
         found = dict(zip(("hidden", "unexplained", "outside", "cut"), columns.T)) | {
             "constant": np.full(len(points), CONSTANT),
@@ -119,6 +118,13 @@ class MonocularDoubt:
         since = before.since if still and before is not None else seconds
         evidence = Evidence(components, unseen, is_frozen(still, seconds - since), self._mirrors.modes(points, images))
         return evidence, Before(mask, still, since)
+
+    def _not_shown(self, state: State) -> Iterator[tuple[str, float]]:
+        """Limbs that may be seen before others by their colours or a detector's joints, and the shares of them that are not."""
+        arms = None if state.observation is None else state.observation.arms
+        seen = None if state.observation is None else state.observation.keypoints
+        yield from ({} if arms is None else self.tracker.arm_colours.mismatch(arms, state.pose)).items()
+        yield from ({} if seen is None else seen.missed(state.pose)).items()
 
     def _of_whole(self, pose: Array, points: Array, mask: Mask) -> dict[str, Array]:
         """Components (L, 3) of a whole body with landmarks `points` (L, 3): their distances from the other side's joints; and those of the

@@ -23,10 +23,13 @@ EXCHANGED = 0.02
 """Probability of each exchange, of arms, of legs and of both, in a frame of a camera."""
 
 
-def surprises(points: Array, sights: Sights, landmarks: Landmarks) -> Array:
-    """Surprise (N,), nats, of what is seen given the landmarks' places (N, K, 3) in N poses."""
-    out = np.zeros(len(points))
-    _surprises(np.ascontiguousarray(points), landmarks.mirrored, landmarks.limbs, sights, np.zeros((sights.size, 2, 2)), out)
+def surprises(points: Array, sights: Sights, landmarks: Landmarks, *, anywhere: bool = False) -> Array:
+    """Surprise (N,), nats, of what is seen given the landmarks' places (N, K, 3) in N poses. `anywhere`: at whatever distance from the one
+    camera; how large a person is in its picture tells the distance no better than proportions are known."""
+    out, points = np.zeros(len(points)), np.array(points, order="C")
+    if anywhere:
+        _put_along(points, sights, sights.rays.mean(0))
+    _surprises(points, landmarks.mirrored, landmarks.limbs, sights, np.zeros((sights.size, 2, 2)), out)
     return out
 
 
@@ -35,6 +38,16 @@ def exchanges(points: Array, sights: Sights, landmarks: Landmarks) -> Array:
     logs = np.zeros((sights.size, 2, 2))
     sum_surprises(np.ascontiguousarray(points), landmarks.mirrored, landmarks.limbs, sights, logs)
     return np.array([sides(each)[1:] for each in logs]).reshape(-1, 2)
+
+
+def odds_turned(points: Array, sights: Sights, landmarks: Landmarks) -> float:
+    """Log odds that all sides are exchanged in one camera, given the landmarks' places (K, 3): that the person faces the other way rather
+    than as the body does. A frame's are bounded, as a detector exchanges all sides now and then."""
+    logs = np.zeros((1, 2, 2))
+    sum_surprises(np.ascontiguousarray(points), landmarks.mirrored, landmarks.limbs, sights, logs)
+    said, turned = logs[0].sum(0)
+    rare, usual = np.log([EXCHANGED, 1 - EXCHANGED])
+    return float(np.logaddexp(usual - turned, rare - said) - np.logaddexp(usual - said, rare - turned))
 
 
 def pulls(points: Array, sights: Sights, landmarks: Landmarks) -> tuple[NDArray[np.int64], Array]:
@@ -59,6 +72,25 @@ def _surprises(points, mirrored, limbs, sights, logs, out):  # pragma: no cover
         sum_surprises(points[n], mirrored, limbs, sights, logs)
         for c in range(logs.shape[0]):
             out[n] += sides(logs[c])[0]
+
+
+@kernel
+def _put_along(points, sights, view):  # pragma: no cover
+    """Move landmarks (N, K, 3) along one camera's `view` (3,) to where they are nearest to its rays."""
+    for n in range(points.shape[0]):
+        asked, tells = 0.0, 0.0
+        for m in range(sights.landmarks.size):
+            point, origin = points[n, sights.landmarks[m]], sights.origins[m]
+            weight = (1 - sights.outlying[m]) / (sights.squares[m] + across(point, m, sights) / NU)
+            for i in range(2):
+                a = sights.across[m, i]
+                step = a[0] * view[0] + a[1] * view[1] + a[2] * view[2]
+                asked += weight * step * (a[0] * (point[0] - origin[0]) + a[1] * (point[1] - origin[1]) + a[2] * (point[2] - origin[2]))
+                tells += weight * step * step
+        if tells > 0:
+            for k in range(points.shape[1]):
+                for i in range(3):
+                    points[n, k, i] -= asked / tells * view[i]
 
 
 @kernel

@@ -43,14 +43,22 @@ class Sights(NamedTuple):
 
     def without(self, camera: int) -> Sights:
         """Those of the other cameras."""
-        others = self.cameras != camera
-        return Sights(self.origins[others], self.rays[others], self.across[others], self.landmarks[others], self.cameras[others],
-                      self.squares[others], self.outlying[others])
+        return self.only(self.cameras != camera)
+
+    def only(self, chosen: NDArray[np.bool_]) -> Sights:
+        """Those chosen, (M,)."""
+        return Sights(self.origins[chosen], self.rays[chosen], self.across[chosen], self.landmarks[chosen], self.cameras[chosen],
+                      self.squares[chosen], self.outlying[chosen])
 
     def squares_from(self, points: Array, landmarks: Landmarks) -> Array:
         """Squared distances (M,) of the rays from places (K, 3) of the landmarks, each from the nearer of both sides'."""
         places = points[np.stack([self.landmarks, landmarks.mirrored[self.landmarks]])] - self.origins
         return (np.einsum("smi,mji->smj", places, self.across) ** 2).sum(2).min(0)
+
+    def support(self, points: Array, landmarks: Landmarks) -> float:
+        """Share of the keypoints, by their confidence, that lie near landmarks at places (K, 3), on whichever side; NaN without any."""
+        sure = 1 - self.outlying
+        return float((sure * (self.squares_from(points, landmarks) < NEAR**2)).sum() / sure.sum()) if len(sure) else np.nan
 
     @property
     def size(self) -> int:

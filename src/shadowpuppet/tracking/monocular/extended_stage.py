@@ -26,6 +26,9 @@ TURNED_SHARE = 0.5
 """Share of the torso's explored candidates that are turned anywhere, in a silhouette too narrow for the trunk as it was."""
 MEAN_TEMPERATURE = 50.0
 """For the mean estimate: a particle's weight falls to 1/e for this much more cost (pixels at 320 x 240)."""
+NAT = MEAN_TEMPERATURE / 4
+"""Cost of a nat of the keypoints' surprise (pixels at 320 x 240). An upper body is as near with half or four times as much; a whole one
+leans toward the camera then, to explain that its proportions are a few per cent off."""
 WIDE = 5.0
 """Standard deviation of the places of explored candidates, over the noise of a frame."""
 MOVED_SHARE = 2 / 3
@@ -98,6 +101,8 @@ class ExtendedStage(FilterStage):
         if observation.soles is not None and self.moves_feet:
             costs += [soles_cost(self.picture, observation.soles, MEAN_TEMPERATURE / 2)]  # the row errs by a pixel
         costs += [self._motion_cost(motion, last)] if motion else []
+        if (keypoints := observation.keypoints) is not None:
+            costs += [lambda poses: NAT * self.scale * keypoints.surprises(poses, self.hidden_joints)]
         return costs + super().extra_costs(observation, last)
 
     def _motion_cost(self, weight: float, last: Array) -> Cost:

@@ -35,6 +35,8 @@ class FilterStage:
         hide = self.parts == ("torso",) and settings.torso_arms == "hidden"
         arms = [part for arm in ("left_arm", "right_arm") for part in parts_of(picture.body, arm)]
         self.partial = PartialCost(picture, self.dofs, arms if hide else ())
+        hidden = {skeleton.dofs[d].joint for arm in ("left_arm", "right_arm") if hide for d in dofs_of(skeleton, arm)}
+        self.hidden_joints = tuple(sorted(hidden))
         self._partials = dict[tuple[str, ...], PartialCost]()  # of some of the arms' parts alone
 
         table = {part: settings.torso if part == "torso" else settings.arm for part in self.parts}  # columns of Table I

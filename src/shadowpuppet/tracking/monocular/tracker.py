@@ -11,14 +11,18 @@ from numpy.typing import NDArray
 
 from shadowpuppet.body.segments import dofs_of, limbs_of
 from shadowpuppet.body.upper_body import TWIST
+from shadowpuppet.body.whole_body import GLOBAL_DOFS
 from shadowpuppet.camera.bits import count, pack
 from shadowpuppet.camera.colour_codes import ColourCode
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask, check_mask
 from shadowpuppet.camera.rasterize import Picture
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.arm_colours import WELL, ArmColours, ColourCounts
+from shadowpuppet.tracking.keypoints.front import CERTAIN
 from shadowpuppet.tracking.monocular import pose_search
 from shadowpuppet.tracking.monocular.extended_stage import HEADING, make_stage
+from shadowpuppet.tracking.monocular.joints_seen import JointsSeen
 from shadowpuppet.tracking.monocular.leg_postures import FLOOR_WEIGHT, floor_below, floor_cost, posture_penalty
 from shadowpuppet.tracking.monocular.settings import MonocularSettings, pixel_scale
 from shadowpuppet.tracking.monocular.stages import FilterStage
@@ -27,7 +31,7 @@ from shadowpuppet.tracking.particle_filter import Particles, diffuse, evaluate, 
 from shadowpuppet.tracking.recovery import settle, track_or_recover
 from shadowpuppet.tracking.resampling import Scheme
 from shadowpuppet.tracking.silhouette_cost import Cost, Observation
-from shadowpuppet.tracking.status import ABSENT_AREA, status_of
+from shadowpuppet.tracking.status import ABSENT_AREA, agreement_of, status_of
 from shadowpuppet.tracking.unexplained import Unexplained, look_beside, without
 
 NARROW = 0.08
@@ -54,6 +58,10 @@ class State(NamedTuple):
     """Intersection over union of the drawn estimate and the silhouette, legs left out."""
     status: str
     """`tracked`, `uncertain`, `lost` or `absent`."""
+    support: float = np.nan
+    """Share of the keypoints that lie near the estimate; NaN without keypoints."""
+    against: float = 0.0
+    """Log odds of keypoints in the last frames against the way that a whole body faces."""
     unexplained: Unexplained | None = None
     """What the silhouettes have beside the body; None if nothing is left out."""
     mask: Mask | None = None
@@ -69,8 +77,8 @@ class State(NamedTuple):
 
     @property
     def agreement(self) -> float:
-        """The overlap: the measure of a loss."""
-        return self.overlap
+        """The measure of a loss."""
+        return agreement_of(self.overlap, self.support)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +90,8 @@ class MonocularTracker:
     settings: MonocularSettings = field(default_factory=MonocularSettings)
     scheme: Scheme | None = None
     """A resampling scheme of your own, in place of the settings'."""
+    rate: float = 30.0
+    """Frames/s."""
     looks: int = 0
     """Number of frames after which parts of the silhouettes that the body does not explain are left out; 0: never."""
     moves: bool = True
@@ -91,25 +101,31 @@ class MonocularTracker:
     """Whether the film is blurred by motion. A silhouette then has what a limb covers at any time of the exposure, which is too wide; what
     is covered since this frame only, and so for a part of the exposure, does not count, except in the status."""
 
-    def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None, codes: ColourCode | None = None) -> State:
+    def step(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None, codes: ColourCode | None = None,
+             keypoints: Keypoints | None = None) -> State:
         """The state after a new mask (H, W). If no person is visible the pose is held; after a loss the person is searched for (`recover`).
         `also`: a cost of your own, poses (N, D) to pixels (N,), added to eq. 2; `codes`: the picture's colours (`colour_codes`), if the
-        arms may be found by them. Raises `TrackingError` for a mask of another size than the camera's."""
+        arms may be found by them; `keypoints`: what a detector found in the picture. Raises `TrackingError` for a mask of another size than
+        the camera's."""
         mask = check_mask(mask, self.picture.camera.size)
         rest = without(mask, state.unexplained)
         found = track_or_recover(
             state, is_absent=self.is_absent(rest, state.pose), recover=self.settings.recover, hold=self.absent,
-            cycle=lambda state: self.cycle(rng, state, mask, also, codes), search=lambda: self.start(rng, rest, also))  # fmt: skip
-        found = self.searched_again(rng, found._replace(followed=state.followed + 1, least=state.least), rest, also)
+            cycle=lambda state: self.cycle(rng, state, mask, also, codes, keypoints),
+            search=lambda: self.start(rng, rest, also, keypoints))  # fmt: skip
+        found = self.searched_again(rng, found._replace(followed=state.followed + 1, least=state.least), rest, also, keypoints)
+        found = self.faced(rng, state, found, rest, also, keypoints)
         if self.looks:
             found = found._replace(unexplained=self.unexplained(state.unexplained, mask, found))
         found = found._replace(colours=self.learnt(state.colours, codes, rest, found))
         return found._replace(mask=mask) if self.blurred else found
 
-    def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None, codes: ColourCode | None = None) -> State:
+    def cycle(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None, codes: ColourCode | None = None,
+              keypoints: Keypoints | None = None) -> State:
         """The loop body of Algorithm 2 on a mask (H, W), `cycles` times: each stage resamples, diffuses and weighs (Algorithms 3, 4)."""
         last, particles = state.pose, list(state.particles)
         estimate, whole = last, self.observe(mask, last, also, state.unexplained)
+        whole = replace(whole, keypoints=JointsSeen.of(self.picture, keypoints, last))
         observation = whole if state.mask is None else whole.ignoring(mask & ~state.mask)
         if codes is not None and self.settings.arm_colours:
             arms = self.arm_colours.seen(state.colours, codes, mask, last, observation.ignore)
@@ -129,7 +145,8 @@ class MonocularTracker:
                 others = estimate if stage.moves_torso else others
         return self.judge(estimate, particles, whole)
 
-    def searched_again(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None) -> State:
+    def searched_again(self, rng: np.random.Generator, state: State, mask: Mask, also: Cost | None = None,
+                       keypoints: Keypoints | None = None) -> State:
         """A whole body's state, or with `turned`, where its misfit has grown, a better one searched for in the mask (H, W)."""
         legs = any(limb.endswith("leg") for limb in limbs_of(self.picture.body.skeleton))
         if not legs or not self.settings.turned or state.status == "absent":
@@ -137,9 +154,29 @@ class MonocularTracker:
         misfit = self.misfit(state)
         if state.followed < SEARCHED_AFTER or misfit < GROWN * state.least:
             return state._replace(least=min(state.least, misfit))
-        found = self.start(rng, mask, also)
+        found = self.start(rng, mask, also, keypoints)
         better = found.status != "absent" and self.misfit(found) < BETTER * misfit
         return found if better else state._replace(followed=0, least=misfit)
+
+    def faced(self, rng: np.random.Generator, state: State, found: State, mask: Mask, also: Cost | None = None,
+              keypoints: Keypoints | None = None) -> State:
+        """The state `found` in a mask (H, W), or one of the other way, once keypoints of half a second are certain that a whole body faces
+        it. `state`: the frame before."""
+        against = max(state.against + self.against(found) * 2 / self.rate, 0.0)
+        if against <= CERTAIN:
+            return found._replace(against=against)
+        return self.start(rng, mask, also, keypoints, self.turned(found.pose))
+
+    def against(self, state: State) -> float:
+        """Log odds of the keypoints of a state's frame against the way that a whole body faces."""
+        seen = None if state.observation is None or HEADING not in self.picture.body.skeleton.dof_names else state.observation.keypoints
+        return 0.0 if seen is None or state.status in ("absent", "lost") else seen.against(state.pose)
+
+    def turned(self, pose: Array) -> Array:
+        """The upright whole body at the place of a pose (D,), facing the other way."""
+        skeleton = self.picture.body.skeleton
+        moved = np.isin(skeleton.dof_names, (*GLOBAL_DOFS[:3], HEADING))
+        return np.where(moved, pose, 0.0) + np.pi * (np.array(skeleton.dof_names) == HEADING)
 
     @property
     def free(self) -> bool:
@@ -157,12 +194,15 @@ class MonocularTracker:
         total = state.cost + scale * self.settings.posture_weight * float(posture_penalty(self.picture.body.skeleton, pose)[0])
         return total if floor is None else total + float(floor_cost(self.picture, floor, FLOOR_WEIGHT * scale)(pose)[0])
 
-    def start(self, rng: np.random.Generator, mask: Mask, also: Cost | None = None) -> State:
+    def start(self, rng: np.random.Generator, mask: Mask, also: Cost | None = None, keypoints: Keypoints | None = None,
+              about: Array | None = None) -> State:
         """A state from one mask (H, W): particles around the best coarse poses (eq. 5), then cycles on this mask; `absent` if no
-        person is visible. `also` and errors: as in `step`."""
+        person is visible. `about` (D,): where a body is searched for; else the way that it faces is that of the keypoints. Others and
+        errors: as in `step`."""
         mask = check_mask(mask, self.picture.camera.size)
-        found = self.search(mask)
+        found = self.search(mask) if about is None else pose_search.search_pose(self.picture, mask, about)
         observation, particles = self.observe(mask, found.pose, also), []
+        observation = replace(observation, keypoints=JointsSeen.of(self.picture, keypoints, found.pose, mask))
         for stage in self.stages:
             poses = np.repeat(found.pose[None], stage.number, axis=0)
             for limb, tried in found.limbs.items():
@@ -173,7 +213,10 @@ class MonocularTracker:
         state = self.judge(found.pose, particles, observation)
         if self.is_absent(mask, found.pose):
             return self.absent(state)
-        return settle(state, lambda state: self.cycle(rng, state, mask, also))
+        state = settle(state, lambda state: self.cycle(rng, state, mask, also, keypoints=keypoints))
+        if about is not None or self.against(state) <= 0:
+            return state
+        return min(state, self.start(rng, mask, also, keypoints, self.turned(state.pose)), key=self.against)
 
     def search(self, mask: Mask) -> pose_search.CoarsePose:
         """The best coarse pose in a mask (H, W); with `turned` of all directions and heights if the upright person fits badly."""
@@ -204,9 +247,10 @@ class MonocularTracker:
         return self.arm_colours.learnt(colours, codes, mask, state.pose)
 
     def judge(self, pose: Array, particles: list[Particles], observation: Observation) -> State:
-        """The state of an estimate (D,), with its cost, overlap and status."""
+        """The state of an estimate (D,), with its cost, overlap, support and status."""
         cost, overlap = observation.cost_and_overlap(self.picture.draw(pose))
-        return State(pose, tuple(particles), cost, overlap, status_of(overlap), observation=observation)
+        support = np.nan if observation.keypoints is None else observation.keypoints.support(pose)
+        return State(pose, tuple(particles), cost, overlap, status_of(overlap, support), support, observation=observation)
 
     def is_absent(self, mask: Mask, pose: Array) -> bool:
         """Whether a mask (H, W) is too small to be the person last seen in `pose` (D,)."""

@@ -51,10 +51,9 @@ class KeypointEvidence:
         return int((np.bincount(sure, minlength=1) >= FEWEST).sum()) >= min(2, self.cameras)
 
     def support(self, pose: Array) -> float:
-        """Share of the keypoints, by their confidence, that lie near the landmarks of a pose (D,), on whichever side; NaN without any."""
-        marks, sure = self.refiner.landmarks, 1 - self.sights.outlying
-        places = self.refiner.body.skeleton.points(pose[None], marks.joints, marks.places)[0]
-        return float((sure * (self.sights.squares_from(places, marks) < NEAR**2)).sum() / sure.sum()) if len(sure) else np.nan
+        """Share of the keypoints that lie near the landmarks of a pose (D,): `Sights.support`."""
+        marks = self.refiner.landmarks
+        return self.sights.support(self.refiner.body.skeleton.points(pose[None], marks.joints, marks.places)[0], marks)
 
     @property
     def rays(self) -> tuple[Sights, float]:

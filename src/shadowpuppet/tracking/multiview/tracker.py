@@ -36,13 +36,11 @@ from shadowpuppet.tracking.particle_filter import Particles, Weigh, better_of, e
 from shadowpuppet.tracking.recovery import OVERLAP_DROP, settle, track_or_recover
 from shadowpuppet.tracking.resampling import SCHEMES, Indices, Scheme, normalise, with_best
 from shadowpuppet.tracking.silhouette_cost import Cost
-from shadowpuppet.tracking.status import status_of
+from shadowpuppet.tracking.status import agreement_of, status_of
 from shadowpuppet.tracking.unexplained import Unexplained, look_beside
 
 ARM_COLOURS = 0.1
 """`MultiviewSettings.arm_colours` of few cameras."""
-CONTRADICTION = 0.4
-"""Difference of overlap and support from which on silhouettes and keypoints are of different things."""
 WELL = 0.75
 """Least overlap of body and silhouettes at which colours are learnt."""
 MIN_POINTS, MIN_EXTENT = 50, 0.5
@@ -86,8 +84,8 @@ class MultiviewState(NamedTuple):
 
     @property
     def agreement(self) -> float:
-        """The overlap, or the support where that is greater: furniture in silhouettes and a poor detector are no loss."""
-        return float(np.fmax(self.overlap, self.support))
+        """The measure of a loss."""
+        return agreement_of(self.overlap, self.support)
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,9 +324,7 @@ class MultiviewTracker:
         """The state of a pose (D,), with its cost, overlap, support and status."""
         cost, overlap = float(weigh(pose[None])[0][0]), observation.overlap(pose)
         support = np.nan if observation.keypoints is None else observation.keypoints.support(pose)
-        found = MultiviewState(pose, velocity, particles, cost, overlap, "", support=support)
-        status = status_of(found.agreement)
-        return found._replace(status="uncertain" if status == "tracked" and abs(overlap - support) > CONTRADICTION else status)
+        return MultiviewState(pose, velocity, particles, cost, overlap, status_of(overlap, support), support=support)
 
     def is_present(self, observation: MultiviewObservation) -> bool:
         """Whether the surface points are enough, and extended enough, for a person; or, without silhouettes, the keypoints."""
