@@ -13,6 +13,7 @@ import numpy as np
 from shadowpuppet.body.upper_body import WRIST_SHARE
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.colour_codes import ColourCode, colour_codes
+from shadowpuppet.camera.keypoints import Keypoints
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.motion.table import read_joints
@@ -46,6 +47,8 @@ class Case:
     """For the tracker."""
     codes: list[ColourCode | None]
     """Their colours."""
+    keypoints: list[Keypoints | None]
+    """What a detector found in their frames."""
     truth: JointTable
 
     @classmethod
@@ -62,7 +65,8 @@ class Case:
         frames = [(frame.time, survey.silhouettes[0].segmented(frame)) for frame in footage.frames(masks)]
         times, tracked = np.array([time for time, _ in frames]), [found.mask for _, found in frames]
         codes = [colour_codes(found.image) for _, found in frames]
-        return cls(path.name, survey, times, tracked, codes, read_joints(footage.recording.truth))
+        keypoints = [None if footage.keypoints is None else footage.keypoints_at(float(time)) for time in times]
+        return cls(path.name, survey, times, tracked, codes, keypoints, read_joints(footage.recording.truth))
 
     @property
     def camera(self) -> Camera:
@@ -89,7 +93,7 @@ class Case:
         frame."""
         rate = 1 / float(np.median(np.diff(self.times)))
         subject = MonocularSubject.of(SizeFit(person, {}, {}, np.zeros((0, 0))), self.camera, settings, "", rate)
-        seen = [ColouredMask(mask, codes) for mask, codes in zip(self.masks, self.codes, strict=True)]
+        seen = [ColouredMask(*each) for each in zip(self.masks, self.codes, self.keypoints, strict=True)]
         frames, spent, last = _pass(subject, rng, self.times, seen)
         motion = _motion(subject, frames)
         if subject.both_ways:

@@ -167,21 +167,32 @@ FIRST_FITS, FITS, FIT_STEP, FIT_DAMPING = 60, 8, 1e-4, 1e-4
 
 
 def track_monocular(path: Path, kind: str = "monocular") -> Iterator[Tracked]:
-    """A recording of one camera with every fault; `monocular_whole`: tracked as a whole body."""
-    case, options = Case.read(path), make_options({"body": "anatomical"} if kind == "monocular_whole" else {})
+    """A recording of one camera with every fault, or beside keypoints with some of them; a `whole` kind: tracked as a whole body."""
+    if kind in ("monocular", "monocular_whole"):
+        yield from followed(path, kind, FAULTS)
+        return
+    for detector, faults in (("mediapipe", ("clean", *BESIDE)), ("poor", ("clean",))):
+        for run in followed(with_keypoints(path, detector), kind, {name: FAULTS[name] for name in faults}):
+            yield replace(run, recording=path.name, fault=run.fault if detector == "mediapipe" else f"{detector}, {run.fault}")
+
+
+def followed(path: Path, kind: str, faults: Mapping[str, Fault]) -> Iterator[Tracked]:
+    """A recording of one camera tracked with some faults."""
+    case, options = Case.read(path), make_options({"body": "anatomical"} if kind.endswith("whole") else {})
     picture = case.person(options, np.random.default_rng(0)).picture(case.camera, options.tracker.body)
     skeleton, names, rate = picture.body.skeleton, picture.body.landmark_names, 1 / float(np.median(np.diff(case.times)))
     turn, truth = case.camera.T_camera_world[:3, :3], _places(case.truth, names)
     right = true_poses(skeleton, picture.points_world, truth)
     model, angles = variance_model(kind), np.array([dof.kind == "rotation" for dof in skeleton.dofs])
-    for n, (fault, spoil) in enumerate(FAULTS.items()):
+    for n, (fault, spoil) in enumerate(faults.items()):
         masks, rng = spoil(np.random.default_rng(n), case.masks, rate), np.random.default_rng(1)
         codes = [None] * len(masks) if fault in OTHER_MOMENTS else case.codes
         tracker = MonocularTracker(picture, options.tracker)
         doubt, state, before, rows, poses, deviations, statuses = MonocularDoubt(tracker), None, None, [], [], [], list[str]()
         modes = list[tuple[float, float]]()
-        for n, (seconds, mask, seen) in enumerate(zip(case.times.tolist(), masks, codes)):
-            state = tracker.start(rng, mask) if state is None else tracker.step(rng, state, mask, codes=seen)
+        for n, (seconds, mask, seen, keypoints) in enumerate(zip(case.times.tolist(), masks, codes, case.keypoints)):
+            state = (tracker.start(rng, mask, keypoints=keypoints) if state is None
+                     else tracker.step(rng, state, mask, codes=seen, keypoints=keypoints))
             found, before = doubt.evidence(state, mask, seconds, before)
             rows.append(found.components)
             poses.append(np.full_like(state.pose, np.nan) if state.status in BLANK else state.pose)
@@ -313,10 +324,12 @@ def _whole() -> list[postures.Film]:
     return [film for film in postures.films() if film.body is not None]
 
 
-TRACK = {"monocular": track_monocular, "monocular_whole": partial(track_monocular, kind="monocular_whole"),
+ONE = ("monocular", "monocular_whole", "both_one", "both_whole")
+TRACK = {**{kind: partial(track_monocular, kind=kind) for kind in ONE},
          **{kind: partial(track_multiview, kind=kind) for kind in ("multiview", "pair", *SIGHTINGS)}}  # fmt: skip
 MADE: dict[str, Callable[[], list[Path]]] = {
-    "monocular": lambda: made_ground(GROUND), "monocular_whole": lambda: [WHOLE / film.spec.name for film in whole_people.films()],
+    **dict.fromkeys(("monocular", "both_one"), lambda: made_ground(GROUND)),
+    **dict.fromkeys(("monocular_whole", "both_whole"), lambda: [WHOLE / film.spec.name for film in whole_people.films()]),
     **dict.fromkeys(("multiview", *SIGHTINGS), _rings), "pair": lambda: [WHOLE / film.spec.name for film in whole_people.pairs()],
     "keypoints_one": lambda: [*_rings(), *(POSTURES / film.spec.name for film in _whole())],
 }  # fmt: skip

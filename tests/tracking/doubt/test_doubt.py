@@ -36,7 +36,7 @@ def test_shoulders_move_with_the_trunk():
     assert {part for part in average_body("anatomical").parts if limb_of_part(part) == "trunk"} == trunk
 
 
-@pytest.mark.parametrize("kind", ["multiview", "monocular_whole"])
+@pytest.mark.parametrize("kind", ["multiview", "monocular_whole", "both_whole"])
 def test_soles_have_factors_of_their_own(kind):
     factors = variance_model(kind).factors
     ankle, sole, hand = (list(GROUPS).index(group_of(joint)) for joint in ("left_ankle", "left_toe", "left_hand"))
@@ -44,15 +44,17 @@ def test_soles_have_factors_of_their_own(kind):
     assert not np.array_equal(factors[hand], factors[sole])
 
 
-def test_an_upper_body_has_no_factors_of_legs():
-    assert variance_model("monocular").groups == ("pelvis", "neck", "shoulder", "elbow", "hand")
+@pytest.mark.parametrize("kind", ["monocular", "both_one"])
+def test_an_upper_body_has_no_factors_of_legs(kind):
+    assert variance_model(kind).groups == ("pelvis", "neck", "shoulder", "elbow", "hand")
 
 
-@pytest.mark.parametrize("kind", ["monocular", "monocular_whole", "multiview"])
+@pytest.mark.parametrize("kind", ["monocular", "monocular_whole", "both_one", "both_whole", "multiview"])
 def test_the_calibrated_factors_are_whole(kind):
-    model = variance_model(kind)
-    bodies = [average_body(name) for name in MODELS if (name in people.BODIES) == (kind == "monocular")]
-    assert kind == "multiview" or {kind_before_one(body) for body in bodies} == {kind}
+    model, beside = variance_model(kind), kind.startswith("both")
+    bodies = [average_body(name) for name in MODELS if (name in people.BODIES) == (kind in ("monocular", "both_one"))]
+    assert kind == "multiview" or {kind_before_one(body, keypoints=beside) for body in bodies} == {kind}
+    assert ("missed" in model.names) is beside
     assert {group_of(joint) for body in bodies for joint in body.landmark_names} <= set(model.groups)
     assert model.factors.shape == (len(model.groups), 3, len(model.names))
     assert (model.factors >= 0).all()

@@ -124,6 +124,20 @@ def test_an_arm_before_the_trunk_is_found_by_its_joints_and_vouched_for():
     assert found[True] < 0.5 * found[False]
 
 
+def test_what_keypoints_miss_and_a_front_that_they_contradict_are_doubt():
+    pose, rng = WHOLE.body.skeleton.pose(left_shoulder_x=1.2), np.random.default_rng(0)
+    tracker, mask = MonocularTracker(WHOLE, make_settings(), moves=False), WHOLE.mask(pose)
+    found, names = dict[str, dict[str, Array]](), WHOLE.body.landmark_names
+    for title, keypoints in (("seen", detected(WHOLE, pose)), ("missed", detected(WHOLE, pose, without=("left_wrist",))),
+                             ("turned", detected(WHOLE, tracker.turned(pose))), ("none", None)):  # fmt: skip
+        state = tracker.start(rng, mask, keypoints=keypoints, about=WHOLE.body.skeleton.pose())._replace(pose=pose)
+        found[title] = MonocularDoubt(tracker).evidence(state, mask, 0.0, None)[0].components
+    hand = names.index("left_hand")
+    assert found["missed"]["missed"][hand, 0] > 10 * found["seen"]["missed"][hand, 0]
+    assert found["turned"]["exchanged"][hand].max() > 5 * found["seen"]["exchanged"][hand].max()
+    assert "missed" not in found["none"]
+
+
 def test_a_limb_misses_what_no_keypoint_shows_near_it():
     joints = seen(UPPER, BEFORE_TRUNK, without=("left_wrist",))
     missed = joints.missed(BEFORE_TRUNK)

@@ -24,6 +24,7 @@ from shadowpuppet.tracking.doubt.variance import kind_before_one
 from shadowpuppet.tracking.frozen import is_frozen, same_silhouette
 from shadowpuppet.tracking.monocular.standing_place import standing_place
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker, State
+from shadowpuppet.tracking.silhouette_cost import Landmarked
 from shadowpuppet.tracking.unexplained import without
 
 SAMPLES = 24
@@ -66,7 +67,8 @@ class MonocularDoubt:
         evidence, now = self.evidence(state, mask, seconds, before)
         R = picture.camera.T_camera_world[:3, :3].T
         skeleton = picture.body.skeleton
-        found = state_doubt(kind_before_one(picture.body), evidence, self.names, skeleton, picture.points, state.pose, state.status, R)
+        kind = kind_before_one(picture.body, keypoints=_keypoints_of(state) is not None)
+        found = state_doubt(kind, evidence, self.names, skeleton, picture.points, state.pose, state.status, R)
         return (found._replace(limb_status=self._without_trunk(found.limb_status)) if self._bows_low(state.pose) else found), now
 
     def _bows_low(self, pose: Array) -> bool:
@@ -114,6 +116,8 @@ class MonocularDoubt:
         components["distance"] = points * (0, 0, DISTANCE)
         if self.tracker.picture.body.hem is None:
             components |= self._of_whole(state.pose, points, without(mask, state.unexplained))
+        if (seen := _keypoints_of(state)) is not None:
+            components |= self._by_keypoints(seen, state.pose, points)
         unseen = {limb: max(hidden, cut) for limb, (hidden, _, _, cut) in shares.items()}
         since = before.since if still and before is not None else seconds
         evidence = Evidence(components, unseen, is_frozen(still, seconds - since), self._mirrors.modes(points, images))
@@ -121,8 +125,7 @@ class MonocularDoubt:
 
     def _not_shown(self, state: State) -> Iterator[tuple[str, float]]:
         """Limbs that may be seen before others by their colours or a detector's joints, and the shares of them that are not."""
-        arms = None if state.observation is None else state.observation.arms
-        seen = None if state.observation is None else state.observation.keypoints
+        arms, seen = None if state.observation is None else state.observation.arms, _keypoints_of(state)
         yield from ({} if arms is None else self.tracker.arm_colours.mismatch(arms, state.pose)).items()
         yield from ({} if seen is None else seen.missed(state.pose)).items()
 
@@ -141,6 +144,13 @@ class MonocularDoubt:
         found = {"stature": nowhere if stature is None else stature, "no_stature": depth, "floor": nowhere if floor is None else floor}
         return {"swapped": np.abs(points - points[self._counterparts]),
                 **{name: np.broadcast_to(length, points.shape) for name, length in found.items()}}
+
+    def _by_keypoints(self, seen: Landmarked, pose: Array, points: Array) -> dict[str, Array]:
+        """Components (L, 3) of a pose (D,) with landmarks `points` (L, 3): the share of its limb's joints that no keypoint shows, times the
+        joint's lever; and the distance from the other side's joint, times the root of the probability that sides are exchanged."""
+        missed, turned = seen.missed(pose), 1 / (1 + np.exp(-seen.against(pose)))
+        share = np.array([missed.get(limb_of(name), 1.0) for name in self.names]) * levers_of(self.names)
+        return {"missed": np.repeat(share[:, None], 3, axis=1), "exchanged": np.sqrt(turned) * np.abs(points - points[self._counterparts])}
 
     @cached_property
     def _counterparts(self) -> list[int]:
@@ -208,3 +218,8 @@ class MonocularDoubt:
         root = self.names.index("neck") if limb == "trunk" else own[0]
         length = TRUNK_REACH if limb == "trunk" else REACH * float(np.sqrt((np.diff(points[own], axis=0) ** 2).sum(1)).sum())
         return pixels[root], length * focal / points[root, 2]
+
+
+def _keypoints_of(state: State) -> Landmarked | None:
+    """The keypoints of a state's frame, if there are any."""
+    return None if state.observation is None else state.observation.keypoints

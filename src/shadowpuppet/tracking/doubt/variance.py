@@ -76,9 +76,10 @@ def without_side(name: str) -> str:
     return rest if side in SIDES else name
 
 
-def kind_before_one(body: Body) -> str:
-    """The calibrated model of a body before one camera."""
-    return "monocular_whole" if body.hem is None else "monocular"
+def kind_before_one(body: Body, *, keypoints: bool = False) -> str:
+    """The calibrated model of a body before one camera, with silhouettes alone or with `keypoints` beside them."""
+    upper, whole = ("both_one", "both_whole") if keypoints else ("monocular", "monocular_whole")
+    return whole if body.hem is None else upper
 
 
 @cache
