@@ -202,7 +202,9 @@ def followed(path: Path, kind: str, faults: Mapping[str, Fault]) -> Iterator[Tra
         errors = (truth[: len(poses)] - picture.points_world(np.array(poses))) @ turn.T
         off = right[: len(poses)] - np.array(poses)
         off[:, angles] = wrapped(off[:, angles])
-        components = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        every = max(rows, key=len)
+        errors[[len(row) < len(every) for row in rows]] = np.nan  # no keypoints in this frame: another kind of doubt
+        components = {name: np.array([row.get(name, np.zeros_like(every[name])) for row in rows]) for name in every}
         yield Tracked(path.name, fault, names, components, errors, np.array(modes).reshape(-1, 2), tuple(dof.name for dof in skeleton.dofs),
                       off, np.array(deviations), np.array(statuses), model.modes)
 

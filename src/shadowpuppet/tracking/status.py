@@ -11,8 +11,6 @@ LOST_OVERLAP, UNCERTAIN_OVERLAP = 0.5, 0.7
 
 PER_OVERLAP = 180.0
 """Log odds of a body that fits the silhouettes better by an overlap of 1 for a second."""
-
-
 CONTRADICTION = 0.4
 """Difference of overlap and support from which on silhouettes and keypoints are of different things."""
 
@@ -26,5 +24,5 @@ def agreement_of(overlap: float, support: float = np.nan) -> float:
 def status_of(overlap: float, support: float = np.nan) -> str:
     """`lost`, `uncertain` or `tracked`, by `agreement_of`."""
     agreement = agreement_of(overlap, support)
-    sure = agreement >= UNCERTAIN_OVERLAP and not abs(overlap - support) > CONTRADICTION
-    return "lost" if agreement < LOST_OVERLAP else "tracked" if sure else "uncertain"
+    unsure = agreement < UNCERTAIN_OVERLAP or abs(overlap - support) > CONTRADICTION
+    return "lost" if agreement < LOST_OVERLAP else "uncertain" if unsure else "tracked"
