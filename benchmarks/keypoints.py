@@ -135,7 +135,7 @@ def one_camera(names: Sequence[str], out: Path, detector: str) -> Iterator[str]:
     """Lines of the table of one camera, for films of some names, all without, or folders of recordings: the run's figures by silhouettes
     and by both."""
     whole = {film.spec.name: film for film in whole_people.films()}
-    upper = {spec.name: n for n, spec in enumerate(proving_ground())}
+    upper = [spec.name for spec in proving_ground()]
     found = dict[tuple[str, str], list[Figures]]()
     yield whole_people.HEAD.replace("| film |", "| film, evidence |")
     for name in names or [*upper, *whole]:

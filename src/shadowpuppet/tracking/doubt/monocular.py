@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -99,7 +99,10 @@ class MonocularDoubt:
         observation = self.tracker.observe(mask, state.pose) if known is None else known
         images = self._mirrors.images(state.pose, points, observation)
         shares = self._shares(state.pose, points, mask, unpack(observation.ignore, mask.shape[1]))
-        for limb, share in self._not_shown(state):
+        arms, seen = None if state.observation is None else state.observation.arms, _keypoints_of(state)
+        colours = {} if arms is None else self.tracker.arm_colours.mismatch(arms, state.pose)
+        missed = {} if seen is None else seen.missed(state.pose)
+        for limb, share in (*colours.items(), *missed.items()):  # an arm before the trunk is seen by its colours or a detector's joints
             hidden, unexplained, outside, cut = shares[limb]
             shares[limb] = (hidden * share, unexplained, outside, cut)
         columns = np.array([shares.get(limb_of(name), (0.0,) * 4) for name in self.names]) * lever[:, None]
@@ -116,18 +119,12 @@ class MonocularDoubt:
         components["distance"] = points * (0, 0, DISTANCE)
         if self.tracker.picture.body.hem is None:
             components |= self._of_whole(state.pose, points, without(mask, state.unexplained))
-        if (seen := _keypoints_of(state)) is not None:
-            components |= self._by_keypoints(seen, state.pose, points)
+        if seen is not None:
+            components |= self._by_keypoints(missed, seen.against(state.pose), points)
         unseen = {limb: max(hidden, cut) for limb, (hidden, _, _, cut) in shares.items()}
         since = before.since if still and before is not None else seconds
         evidence = Evidence(components, unseen, is_frozen(still, seconds - since), self._mirrors.modes(points, images))
         return evidence, Before(mask, still, since)
-
-    def _not_shown(self, state: State) -> Iterator[tuple[str, float]]:
-        """Limbs that may be seen before others by their colours or a detector's joints, and the shares of them that are not."""
-        arms, seen = None if state.observation is None else state.observation.arms, _keypoints_of(state)
-        yield from ({} if arms is None else self.tracker.arm_colours.mismatch(arms, state.pose)).items()
-        yield from ({} if seen is None else seen.missed(state.pose)).items()
 
     def _of_whole(self, pose: Array, points: Array, mask: Mask) -> dict[str, Array]:
         """Components (L, 3) of a whole body with landmarks `points` (L, 3): their distances from the other side's joints; and those of the
@@ -145,10 +142,11 @@ class MonocularDoubt:
         return {"swapped": np.abs(points - points[self._counterparts]),
                 **{name: np.broadcast_to(length, points.shape) for name, length in found.items()}}
 
-    def _by_keypoints(self, seen: Landmarked, pose: Array, points: Array) -> dict[str, Array]:
-        """Components (L, 3) of a pose (D,) with landmarks `points` (L, 3): the share of its limb's joints that no keypoint shows, times the
-        joint's lever; and the distance from the other side's joint, times the root of the probability that sides are exchanged."""
-        missed, turned = seen.missed(pose), 1 / (1 + np.exp(-seen.against(pose)))
+    def _by_keypoints(self, missed: Mapping[str, float], against: float, points: Array) -> dict[str, Array]:
+        """Components (L, 3) of landmarks `points` (L, 3): the share `missed` of its limb's joints that no keypoint shows, times the joint's
+        lever; and the distance from the other side's joint, times the root of the probability, of log odds `against`, that sides are
+        exchanged."""
+        turned = 1 / (1 + np.exp(-against))
         share = np.array([missed.get(limb_of(name), 1.0) for name in self.names]) * levers_of(self.names)
         return {"missed": np.repeat(share[:, None], 3, axis=1), "exchanged": np.sqrt(turned) * np.abs(points - points[self._counterparts])}
 

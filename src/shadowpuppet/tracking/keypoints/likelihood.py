@@ -26,8 +26,9 @@ EXCHANGED = 0.02
 def surprises(points: Array, sights: Sights, landmarks: Landmarks, *, anywhere: bool = False) -> Array:
     """Surprise (N,), nats, of what is seen given the landmarks' places (N, K, 3) in N poses. `anywhere`: at whatever distance from the one
     camera; how large a person is in its picture tells the distance no better than proportions are known."""
-    out, points = np.zeros(len(points)), np.array(points, order="C")
+    out, points = np.zeros(len(points)), np.ascontiguousarray(points)
     if anywhere:
+        points = points.copy()
         _put_along(points, sights, sights.rays.mean(0))
     _surprises(points, landmarks.mirrored, landmarks.limbs, sights, np.zeros((sights.size, 2, 2)), out)
     return out
