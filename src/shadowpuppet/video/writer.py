@@ -39,7 +39,7 @@ def write_frames(path: str | Path, rate: float, *, size: Size | None = None, los
         lossless: write FFV1.
         crf: constant rate factor of H.264, 0 to 51.
         threads: threads of the encoder, 0: as many as it likes. Then libx264's film depends on the machine's cores and, if pictures are
-            tiny, on chance (1 film in 300 of 64 x 48 pixels differs); with 1 it is the same every time.
+            less than 640 pixels wide, on chance; with 1 it is the same every time, and larger.
     """
     path, endings = Path(path), [".mkv"] if lossless else [".mkv", ".mov", ".mp4"]
     if path.suffix not in endings:
@@ -127,6 +127,8 @@ class FrameWriter:
             codec, settings = "ffv1", {"level": "3", "slicecrc": "1", "g": "1"}
         else:
             codec, settings = "libx264", {"preset": "veryfast", "crf": str(self.crf), "bf": "0", "g": str(max(1, round(self.rate)))}
+            if self.threads == 1:
+                settings["mbtree"] = "0"  # its look-ahead reads memory that nothing has written
         stream: Any = container.add_stream(codec, rate=self.rate, options=settings)
         stream.width, stream.height = size_of(image)
         stream.pix_fmt = "yuv420p" if not self.lossless else "gray" if image.ndim == 2 else "bgr0"
