@@ -4,9 +4,10 @@
 
 Shared recordings, made ones of several cameras and made ones with faults (both made in build/ where they are missing). MediaPipe runs in
 the environment of `shadowpuppet masks --with mediapipe`, which is made where it is missing; its landmarks of several cameras are
-triangulated and smoothed (`triangulation.py`). This program runs with its defaults and the seed 0: as the recording lies, and once more
-without reference pictures and training motion. Landmarks and measures are kept in build/peers and not made again, unless `--again`; the
-tables show all that is there (`--tables`: only print them). Half an hour on one core.
+triangulated and smoothed (`triangulation.py`). This program runs with its defaults and the seed 0: as the recording lies, once more
+without reference pictures and training motion, and so with MediaPipe's keypoints beside the silhouettes and, before several cameras,
+alone. Landmarks and measures are kept in build/peers and not made again, unless `--again`; the tables show all that is there
+(`--tables`: only print them). An hour on one core.
 """
 
 from __future__ import annotations
@@ -78,6 +79,8 @@ class Case(NamedTuple):
     """Whether it is tracked once more without reference pictures and training motion."""
     make: Callable[[], object] | None = None
     """Makes it where it is missing."""
+    known: bool = False
+    """Whether it is tracked with keypoints, too."""
 
     @property
     def place(self) -> Path:
@@ -88,12 +91,12 @@ class Case(NamedTuple):
 def cases(shared: Path, rings: Path, spoiled: Path) -> Iterator[Case]:
     """All recordings, in the order of the tables."""
     for name in ("upper_body", "reaching"):
-        yield Case(ONE_SHARED, name, shared / "recordings" / name, bare=True)
+        yield Case(ONE_SHARED, name, shared / "recordings" / name, bare=True, known=True)
     for name in multiview.MEASURED:
-        yield Case(SEVERAL_SHARED, name, shared / "recordings" / name, bare=True)
-    yield Case(SEVERAL_SHARED, "balancing", shared / "real" / "balancing")
+        yield Case(SEVERAL_SHARED, name, shared / "recordings" / name, bare=True, known=True)
+    yield Case(SEVERAL_SHARED, "balancing", shared / "real" / "balancing", known=True)
     for name in RINGS:
-        yield Case(RING, name, rings / name, bare=True, make=partial(multiview.made, rings, [name]))
+        yield Case(RING, name, rings / name, bare=True, make=partial(multiview.made, rings, [name]), known=True)
     for table, films, rows in ((ONE_SPOILED, fault_rows.films_of_one(), fault_rows.ONE),
                                (FOUR_SPOILED, fault_rows.films_of_several(), fault_rows.SEVERAL)):
         for row in rows:
@@ -132,17 +135,28 @@ def theirs(case: Case, found: dict[str, Array]) -> tuple[JointTable, Array, floa
     return table, np.isfinite(table.positions[..., 0]), spent + time.process_time() - start
 
 
-def ours(case: Case, folder: Path, bare: bool) -> tuple[JointTable, Array, float]:
-    """The joints of a run, which of them it vouches for (T, J), and processor time, s, from films to joints; of several people those of the
-    one who is nearest to the truth."""
+def known(recording: Path, copy: Path) -> Path:
+    """A copy of a recording with the keypoints that `shadowpuppet keypoints` finds by MediaPipe; made where it is missing."""
+    if not (copy / "keypoints").is_dir():
+        shutil.rmtree(copy, ignore_errors=True)
+        command = [sys.executable, "-m", "shadowpuppet", "keypoints", recording, "-o", copy, "--with", "mediapipe", "--quiet"]
+        subprocess.run(list(map(str, command)), check=True)
+    return copy
+
+
+def ours(case: Case, folder: Path, bare: bool, evidence: str = "silhouettes") -> tuple[JointTable, Array, float]:
+    """The joints of a run, which of them it vouches for (T, J), and processor time, s, from films and keypoints to joints; of several
+    people those of the one who is nearest to the truth."""
     run = folder / "runs" / case.place
     shutil.rmtree(run, ignore_errors=True)
     recording = read_recording(case.path)
     source = multiview.given(recording, multiview.Row(training=False), folder / "inputs" / case.place) if bare else case.path
+    if evidence != "silhouettes":
+        source = known(source, folder / "known" / case.place)
     start = time.process_time()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        summary = track_recording(source, run, make_options({"seed": 0}))
+        summary = track_recording(source, run, make_options({"seed": 0, "evidence": evidence}))
     spent = time.process_time() - start
     motion, _ = faults.nearest_person(run, summary, read_truth(case.path / "truth.csv"))
     names = ARMS if len(recording.views) == 1 else LIMB_JOINTS
@@ -178,22 +192,34 @@ def _turned(found: Array, truth: JointTable, names: Sequence[str]) -> float:
     return 1000 * float(whole.mean() * error + (1 - whole.mean()) * LOST_ERROR)
 
 
+def programs(case: Case, folder: Path, again: bool) -> dict[str, Callable[[], tuple[JointTable, Array, float]]]:
+    """What is compared on a recording, by its name in the measures: functions that make it, as `theirs` and `ours` return it."""
+    made = {"mediapipe": lambda: theirs(case, landmarks(case, folder, again)), "ours": lambda: ours(case, folder, False)}
+    if case.bare:
+        made["bare"] = lambda: ours(case, folder, True)
+    if case.known:
+        made["both"] = lambda: ours(case, folder, case.bare, "silhouettes,keypoints")
+        if case.table != ONE_SHARED:
+            made["keypoints"] = lambda: ours(case, folder, case.bare, "keypoints")
+    return made
+
+
 def compared(case: Case, folder: Path, again: bool) -> None:
-    """Measures of both programs on a recording, as a JSON file; nothing if it is there."""
+    """Measures of the programs on a recording, as a JSON file; those that it has already are kept."""
     file = folder / "results" / case.place.with_suffix(".json")
-    if file.exists() and not again:
+    out = json.loads(file.read_text("utf-8")) if file.exists() and not again else {"table": case.table, "row": case.row}
+    missing = {name: make for name, make in programs(case, folder, again).items() if name not in out}
+    if not missing:
         return
     if case.make:
         case.make()
     truth = read_truth(case.path / "truth.csv")
-    found = {"mediapipe": theirs(case, landmarks(case, folder, again)), "ours": ours(case, folder, False)}
-    found |= {"bare": ours(case, folder, True)} if case.bare else {}
     names = ARMS if len(read_recording(case.path).views) == 1 else LIMB_JOINTS
-    counted = truth.between(case.begin, np.inf)
-    out = {program: measures(one, counted, names) for program, one in found.items()}
+    for name, make in missing.items():
+        out[name] = measures(make(), truth.between(case.begin, np.inf), names)
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps({"table": case.table, "row": case.row, **out}, indent=1) + "\n", encoding="utf-8")
-    print(f"{case.table}, {case.path.name}: " + ", ".join(f"{program} {one['mean']:.0f} mm" for program, one in out.items()), flush=True)
+    file.write_text(json.dumps(out, indent=1) + "\n", encoding="utf-8")
+    print(f"{case.table}, {case.path.name}: " + ", ".join(f"{name} {out[name]['mean']:.0f} mm" for name in missing), flush=True)
 
 
 def warm_up() -> None:
@@ -259,8 +285,9 @@ def tables(found: Found) -> dict[str, str]:
     """Every table of which there are measures, by its name on the page."""
     parts = {name: [one for one in found if one["table"] == name] for name in (ONE_SHARED, SEVERAL_SHARED, RING, ONE_SPOILED, FOUR_SPOILED)}
     one = (("MediaPipe", "mediapipe", "mean"), ("turned and scaled to fit", "mediapipe", "turned"), ("shadowpuppet", "ours", "mean"),
-           ("turned and scaled to fit", "ours", "turned"), ("without pictures", "bare", "mean"))
-    several = (("MediaPipe", "mediapipe", "rmse"), ("shadowpuppet", "ours", "rmse"), ("without training", "bare", "rmse"))
+           ("turned and scaled to fit", "ours", "turned"), ("without pictures", "bare", "mean"), ("so, with keypoints", "both", "mean"))
+    several = (("MediaPipe", "mediapipe", "rmse"), ("shadowpuppet", "ours", "rmse"), ("without training", "bare", "rmse"),
+               ("so, with keypoints", "both", "rmse"), ("keypoints alone", "keypoints", "rmse"))
     made = {ONE_SHARED: by_recording(parts[ONE_SHARED], one), SEVERAL_SHARED: by_recording(parts[SEVERAL_SHARED], several),
             RING: by_recording(parts[RING], several), ONE_SPOILED: by_fault(parts[ONE_SPOILED], "mean") if parts[ONE_SPOILED] else "",
             FOUR_SPOILED: by_fault(parts[FOUR_SPOILED], "rmse") if parts[FOUR_SPOILED] else "",
@@ -308,7 +335,7 @@ def main() -> None:
     wanted = list(cases(args.shared, args.rings, args.faults))
     names = {name.strip() for name in args.only.split(";") if name.strip()}
     chosen = [case for case in wanted if not names or names & {case.table, case.row, case.path.name}]
-    chosen = [case._replace(bare=case.bare and not args.quick) for case in chosen]
+    chosen = [case._replace(bare=case.bare and not args.quick, known=case.known and not args.quick) for case in chosen]
     failed = 0
     if not args.tables:
         with ProcessPoolExecutor(1, get_context("spawn"), initializer=None if args.quick else warm_up) as pool:

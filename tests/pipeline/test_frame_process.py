@@ -177,11 +177,15 @@ def test_short_films_and_single_cameras_and_single_cores_need_none(tmp_path, sta
     assert not started
 
 
-def test_what_opencv_has_learnt_stays_here(tmp_path, started):
+def test_what_cannot_be_sent_stays_here(tmp_path, started):
+    """A mixture is an object of OpenCV; a function without a name in a module cannot be found by another process."""
     empty = [np.zeros((SIZE[1], SIZE[0], 3), np.uint8)] * 5
     mixture = Silhouettes("mog2", learn_background(iter(empty), SilhouetteSettings(method="mog2")))
     wanted = task(tmp_path, (6, 6))
     assert len(list(frames_beside(replace(wanted, silhouettes=(mixture, mixture))))) == 6
+    learnt = learn_background(iter(empty), SilhouetteSettings())
+    unnamed = Silhouettes("ours", replace(learnt, classifier=lambda frame: np.zeros(frame.shape[:2], np.uint8)))
+    assert len(list(frames_beside(replace(wanted, silhouettes=(unnamed, unnamed))))) == 6
     assert not started
 
 

@@ -29,6 +29,8 @@ class BodyModel(NamedTuple):
     """The class of its sizes; for a whole body, which stands in the world, a subclass of `BoneSizes`."""
     shares: Mapping[str, tuple[float, float]]
     """The average person's sizes as fractions of the stature, and their deviations."""
+    independent_points: float = 10.0
+    """Effective number of independent surface points a frame, by which several cameras measure sizes."""
 
 
 MODELS: dict[str, BodyModel] = {
@@ -37,7 +39,7 @@ MODELS: dict[str, BodyModel] = {
     "boxes": BodyModel(boxes, CardboxSizes, PROPORTIONS),
     "rounded": BodyModel(rounded, CardboxSizes, PROPORTIONS),
     "anatomical": BodyModel(anatomical, AnatomicalSizes, ANATOMICAL_SHARES),
-    "cylinders": BodyModel(cylinders, CylinderSizes, CYLINDER_SHARES),
+    "cylinders": BodyModel(cylinders, CylinderSizes, CYLINDER_SHARES, 0.2),  # which fit nobody well: more would distort the bones
 }
 WHOLE = tuple(name for name, model in MODELS.items() if issubclass(model.sizes, BoneSizes))
 """Bodies of the whole person."""

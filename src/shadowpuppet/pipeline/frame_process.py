@@ -96,7 +96,7 @@ def frames_beside(task: Task) -> Generator[FrameSet]:
         return task.frames()
     try:
         return _received(pickle.dumps(task, pickle.HIGHEST_PROTOCOL))
-    except TypeError:  # it holds an object of OpenCV
+    except (TypeError, AttributeError, pickle.PicklingError):  # it holds an object of OpenCV, or a function without a place in a module
         return task.frames()
 
 

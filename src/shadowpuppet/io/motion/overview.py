@@ -10,18 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from shadowpuppet.errors import FormatError
+from shadowpuppet.io.motion import READABLE
 from shadowpuppet.io.motion.c3d import read_header
 from shadowpuppet.io.motion.joint_names import columns_of, pairs_of, renamed
 from shadowpuppet.io.motion.motion_files import leg_length, read_motion
 from shadowpuppet.motion.interpolation import rate_of
 from shadowpuppet.motion.motion import JointTable
-
-FORMATS = {
-    ".amc": "AMC (Acclaim): a skeleton's angles, with its .asf", ".bvh": "BVH (Biovision): a skeleton and its angles",
-    ".c3d": "C3D: points of a motion capture system", ".csv": "CSV: a table of joints", ".npz": "NPZ: arrays of a motion",
-    ".parquet": "Parquet: a table of joints", ".trc": "TRC (Motion Analysis, OpenSim): a table of markers",
-}  # fmt: skip
-"""The formats of `io.motion.READABLE` in words."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +61,7 @@ def look_at_motion(path: str | Path) -> MotionLook:
     used = {*(names[n] for n in columns_of(names).values()), *(names[n] for pair in pairs_of(names).values() for n in pair)}
     length = leg_length(renamed(table)) if known and not problem else np.nan
     return MotionLook(
-        str(path), FORMATS[path.suffix.lower()], len(table.times),
+        str(path), READABLE[path.suffix.lower()], len(table.times),
         rate_of(table.times) if len(table.times) > 1 else None, float(table.times[0]), float(table.times[-1]),
         known, tuple(name for name in names if name not in used), float((~np.isfinite(table.positions).all(2)).mean()),
         float(length) if np.isfinite(length) else None,

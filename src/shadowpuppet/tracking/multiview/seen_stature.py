@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
-from shadowpuppet.body.models import average_sizes, make_body
+from shadowpuppet.body.models import MODELS, average_sizes, make_body
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import Sizes
 from shadowpuppet.body.whole_body import GLOBAL_DOFS
@@ -25,7 +25,6 @@ from shadowpuppet.tracking.multiview.size_estimation import (
     CLOTHES,
     EMPTINESS_SHARE,
     GIRTH_DEVIATION,
-    INDEPENDENT_POINTS,
     SIZE_PULL,
     widened,
 )
@@ -112,7 +111,7 @@ def seen_stature(rng: np.random.Generator, cameras: Sequence[Camera], masks: Seq
         seen = MultiviewObservation(tracker.views, points, masks)
         centre, pull = tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture)
         bundle = solve_bundle(make, usual, np.array([LOOSE, GIRTH_DEVIATION]), pose[None], [seen.full], settings.surface, pull=pull[None],
-                              centre=centre[None], worth=INDEPENDENT_POINTS[settings.body], spaces=[seen.space],
+                              centre=centre[None], worth=MODELS[settings.body].independent_points, spaces=[seen.space],
                               emptiness=EMPTINESS_SHARE * settings.gauss_newton.emptiness)
         grown, pose = bundle.sizes.stature, bundle.poses[0].copy()
         height, overlap = grown * AVERAGE_HEIGHT / factor, seen.overlap(pose)

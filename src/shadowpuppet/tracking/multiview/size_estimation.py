@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.body.anthropometry import stature_of
-from shadowpuppet.body.models import shares_of
+from shadowpuppet.body.models import MODELS, shares_of
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes, Sizes
 from shadowpuppet.body.whole_body import heading_column
@@ -46,8 +46,6 @@ ROUNDS = 2
 """Number of rounds; each tracks the first frames, then solves for the sizes."""
 MAX_FRAMES, POINT_STRIDE = 24, 4
 """Largest number of frames that are solved together, and the stride of their points."""
-INDEPENDENT_POINTS = {"anatomical": 10.0, "cylinders": 0.2}
-"""Effective number of independent points per frame, by body. Cylinders fit no person well: more weight would distort the bones."""
 SIZE_PULL = 1e-5
 """Weight of the pull of the poses to the tracked ones."""
 OVERLAP_LOSS = 0.06
@@ -169,7 +167,7 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
     first = first_frames(first)
     plain, prior = replace(settings, method="hybrid", refinement="gauss_newton"), Deviations.of(spread)
     alone = settings.keypoints > 0 and all(mask is None for each in first for mask in each.masks)
-    worth = POINT_NOISE**2 / settings.keypoints if alone else INDEPENDENT_POINTS[settings.body]  # a nat of keypoints counts as one
+    worth = POINT_NOISE**2 / settings.keypoints if alone else MODELS[settings.body].independent_points  # a nat of keypoints counts as one
 
     def followed(rng: np.random.Generator, sizes: Measured, facing: float | None) -> tuple[MultiviewTracker, list[Found]]:
         tracker = MultiviewTracker(make(sizes), tuple(cameras), plain, None, library, looks=looks)
