@@ -12,11 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shadowpuppet.body.models import MODELS
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.sizes import BoneSizes
 from shadowpuppet.geometry import Array
 from shadowpuppet.tracking.multiview.bundle_adjustment import solve_bundle
-from shadowpuppet.tracking.multiview.size_estimation import INDEPENDENT_POINTS, POINT_STRIDE, SIZE_PULL, size_deviations
+from shadowpuppet.tracking.multiview.size_estimation import POINT_STRIDE, SIZE_PULL, size_deviations
 from shadowpuppet.tracking.multiview.tracker import MultiviewState, MultiviewTracker
 from shadowpuppet.tracking.people.tracker import Share, at_pose, is_shown, observed
 
@@ -54,7 +55,7 @@ def measure(rng: np.random.Generator, make: Callable[[BoneSizes], Body], expecte
     pulls = [own.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
     centre, pull = map(np.array, zip(*pulls, strict=True))
     bundle = solve_bundle(make, expected, size_deviations(expected, shown=False), poses, clouds, settings.surface, pull=pull, centre=centre,
-                          worth=INDEPENDENT_POINTS[settings.body])
+                          worth=MODELS[settings.body].independent_points)
     own = replace(own, body=make(bundle.sizes))
     states = [_fitted(rng, own, share, pose) for share, pose in zip(shares, bundle.poses)]
     found, overlaps = np.array([state.pose for state in states]), np.array([state.overlap for state in states])
