@@ -84,7 +84,7 @@ class MultiviewObservation:
     @property
     def rays(self) -> tuple[Sights, float]:
         """Rays to the person's landmarks, none without keypoints; and what a nat of their surprise costs, m^2."""
-        return (NO_SIGHTS, 0.0) if self.keypoints is None else self.keypoints.rays
+        return (NO_SIGHTS, 0.0) if self.keypoints is None else self.keypoints.rays(self.by_keypoints)
 
     @cached_property
     def seen(self) -> tuple[int, ...]:

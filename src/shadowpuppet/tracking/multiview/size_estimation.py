@@ -185,13 +185,16 @@ def estimate_sizes(rng: np.random.Generator, make: Callable[[Measured], Body], e
             frames = [first[found[i][0]] for i in chosen]
             seen = [MultiviewObservation(tracker.views, each.points, each.masks) for each in frames]
             shown = [tracker.shown(*each, last=pose) for each, pose in zip(frames, poses, strict=True)]
+            rays = [(NO_SIGHTS, 0.0) if each is None else each.rays(alone) for each in shown]
+            if not (alone or tracker.sees_quarters_alike):  # a landmark is off alike in all frames; two cameras' hull is too wide
+                rays = [(sights, nat / len(rays)) for sights, nat in rays]
             clouds = [each.cloud(POINT_STRIDE) for each in seen]
             pulls = [tracker.posture_prior.quadratic(pose, SIZE_PULL, settings.posture) for pose in poses]
             centre, pull = map(np.array, zip(*pulls, strict=True))
             bundle = solve_bundle(make, expected, prior, poses, clouds, settings.surface, pull=pull, centre=centre, first=sizes,
                                   worth=worth, spaces=() if prior.together is None else [each.space for each in seen],
                                   emptiness=EMPTINESS_SHARE * settings.gauss_newton.emptiness,
-                                  rays=[(NO_SIGHTS, 0.0) if each is None else each.rays for each in shown])
+                                  rays=rays)
             sizes, residual = bundle.sizes, bundle.residual
         tracker, found = followed(rng, sizes, facing)
         if not found:
