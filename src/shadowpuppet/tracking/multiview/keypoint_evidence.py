@@ -58,11 +58,11 @@ class KeypointEvidence:
     def rays(self, alone: bool) -> tuple[Sights, float]:
         """The rays, and what a nat of their surprise costs, m^2: `alone`, or beside a surface.
 
-        Beside it a nat is one of its weights (eq. 29) with two cameras. With more it is less, by the square of their number: the surface
-        says more, though its cost is a mean; and the rays do not, as a landmark lies beside its joint in all cameras alike.
+        Beside it a nat is one of its weights (eq. 29), and more than two cameras count as two: the surface's cost is a mean over all of
+        them, and a landmark lies beside its joint in all of them alike.
         """
         cameras = len(np.unique(self.sights.cameras))
-        return self.sights, self.worth if alone else (self.settings.sigma_cost * min(1.0, 2 / max(cameras, 1))) ** 2
+        return self.sights, self.worth if alone else self.settings.sigma_cost**2 * min(1.0, 2 / max(cameras, 1))
 
     def cost(self, poses: Array) -> Array:
         """Cost (N,), m^2, of poses (N, D)."""
