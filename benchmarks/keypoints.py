@@ -63,14 +63,20 @@ def films(rings: bool = False) -> Iterator[Spec]:
     yield replace(named_specs()["rings_sits_on_new"], name="new_chair", tells="nothing")
 
 
+def found_by(detector: str, recording: Path, copy: Path) -> Path:
+    """A copy of a recording with the keypoints that `shadowpuppet keypoints` finds in it; made where it is missing."""
+    if not (copy / "keypoints").is_dir():
+        command = [sys.executable, "-m", "shadowpuppet", "keypoints", recording, "-o", copy, "--with", detector, "--quiet"]
+        subprocess.run(list(map(str, command)), check=True)
+    return copy
+
+
 def with_keypoints(recording: Path, detector: str, seed: int = 0) -> Path:
     """A copy of a recording beside it, with keypoints: of one of `detector.DETECTORS`, or those that `shadowpuppet keypoints` finds."""
     found = recording.with_name(f"{recording.name}-{detector}{seed or ''}")
-    if (found / "keypoints").is_dir():
-        return found
     if detector not in DETECTORS:
-        command = [sys.executable, "-m", "shadowpuppet", "keypoints", recording, "-o", found, "--with", detector, "--quiet"]
-        subprocess.run(list(map(str, command)), check=True)
+        return found_by(detector, recording, found)
+    if (found / "keypoints").is_dir():
         return found
     shutil.copytree(recording, found, dirs_exist_ok=True, ignore=shutil.ignore_patterns("keypoints"))
     rig = open_rig(recording, make_options({"evidence": "silhouettes"}))

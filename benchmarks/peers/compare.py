@@ -37,6 +37,7 @@ import fault_rows  # noqa: E402
 import faults  # noqa: E402
 import multiview  # noqa: E402
 import smallest  # noqa: E402
+from keypoints import found_by  # noqa: E402
 from speed.chain import ONE_THREAD_EACH  # noqa: E402
 from triangulation import LANDMARKS, SEEN, one_camera, several_cameras  # noqa: E402
 
@@ -135,15 +136,6 @@ def theirs(case: Case, found: dict[str, Array]) -> tuple[JointTable, Array, floa
     return table, np.isfinite(table.positions[..., 0]), spent + time.process_time() - start
 
 
-def known(recording: Path, copy: Path) -> Path:
-    """A copy of a recording with the keypoints that `shadowpuppet keypoints` finds by MediaPipe; made where it is missing."""
-    if not (copy / "keypoints").is_dir():
-        shutil.rmtree(copy, ignore_errors=True)
-        command = [sys.executable, "-m", "shadowpuppet", "keypoints", recording, "-o", copy, "--with", "mediapipe", "--quiet"]
-        subprocess.run(list(map(str, command)), check=True)
-    return copy
-
-
 def ours(case: Case, folder: Path, bare: bool, evidence: str = "silhouettes") -> tuple[JointTable, Array, float]:
     """The joints of a run, which of them it vouches for (T, J), and processor time, s, from films and keypoints to joints; of several
     people those of the one who is nearest to the truth."""
@@ -152,7 +144,7 @@ def ours(case: Case, folder: Path, bare: bool, evidence: str = "silhouettes") ->
     recording = read_recording(case.path)
     source = multiview.given(recording, multiview.Row(training=False), folder / "inputs" / case.place) if bare else case.path
     if evidence != "silhouettes":
-        source = known(source, folder / "known" / case.place)
+        source = found_by("mediapipe", source, folder / "known" / case.place)
     start = time.process_time()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -213,10 +205,10 @@ def compared(case: Case, folder: Path, again: bool) -> None:
         return
     if case.make:
         case.make()
-    truth = read_truth(case.path / "truth.csv")
+    counted = read_truth(case.path / "truth.csv").between(case.begin, np.inf)
     names = ARMS if len(read_recording(case.path).views) == 1 else LIMB_JOINTS
     for name, make in missing.items():
-        out[name] = measures(make(), truth.between(case.begin, np.inf), names)
+        out[name] = measures(make(), counted, names)
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(json.dumps(out, indent=1) + "\n", encoding="utf-8")
     print(f"{case.table}, {case.path.name}: " + ", ".join(f"{name} {out[name]['mean']:.0f} mm" for name in missing), flush=True)

@@ -421,6 +421,14 @@ def found_in(frames: int = 12, by: Detector = USUAL, above: float = 0.0) -> list
     return detected(np.random.default_rng(1), actor.cameras(), np.arange(frames) / 20, marks.names, joints, by)
 
 
+def shown(of: MultiviewTracker, seen: Iterable, found: Iterable[list[Keypoints]]) -> list[MultiviewState]:
+    """States by silhouettes and keypoints together."""
+    rng, states = np.random.default_rng(0), []
+    for frame, keypoints in zip(seen, found):
+        states.append(of.step(rng, states[-1], *frame, keypoints=keypoints) if states else of.start(rng, *frame, keypoints=keypoints))
+    return states
+
+
 def turned_round(pose: np.ndarray) -> np.ndarray:
     """The same place and posture, facing the other way."""
     out = pose[other_side(NAMES)]
@@ -432,19 +440,14 @@ def turned_round(pose: np.ndarray) -> np.ndarray:
 def test_keypoints_beside_exact_silhouettes_cost_no_more_than_their_detector_s_definitions(by, within):
     poses, seen = actor.filmed()
     of = tracker()
-    rng, states = np.random.default_rng(0), []
-    for frame, keypoints in zip(seen, found_in(by=by)):
-        states.append(of.step(rng, states[-1], *frame, keypoints=keypoints) if states else of.start(rng, *frame, keypoints=keypoints))
-    assert np.median(errors(of, states, poses)) < within
+    assert np.median(errors(of, shown(of, seen, found_in(by=by)), poses)) < within
 
 
 def test_landmarks_that_lie_beside_their_joints_in_all_cameras_move_a_body_by_less():
     """Five cameras do not make them truer. Taken for independent, landmarks 30 mm above the joints moved a body by 29, now by 21."""
     poses, seen = actor.filmed()
-    of, rng, states = tracker(), np.random.default_rng(0), []
-    for frame, keypoints in zip(seen, found_in(by=EXACT, above=0.03)):
-        states.append(of.step(rng, states[-1], *frame, keypoints=keypoints) if states else of.start(rng, *frame, keypoints=keypoints))
-    assert np.median(errors(of, states, poses)) < 0.024
+    of = tracker()
+    assert np.median(errors(of, shown(of, seen, found_in(by=EXACT, above=0.03)), poses)) < 0.024
 
 
 @pytest.mark.parametrize(("cameras", "within"), [(5, 0.03), (2, 0.035), (1, 0.12)])

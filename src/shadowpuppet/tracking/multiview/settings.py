@@ -147,7 +147,7 @@ class MultiviewSettings:
     fewer; more show arms well enough."""
     keypoints: NonNegative = 1e-4
     """Weight (m^2) of how surprising a detector's keypoints are, where there are any, in units of a log density as of `arms` and `limbs`.
-    0: they are not used."""
+    Refinement beside silhouettes weighs them by `sigma_cost`. 0: they are not used."""
     cycles: Annotated[int, Field(ge=1, le=100)] | None = None
     """Estimation cycles per frame (annealing). None: one for each 1/30 s that a frame lasts, at most four; one when live."""
     cooling: Annotated[float, Field(gt=0, le=1)] = 0.6
