@@ -15,7 +15,7 @@ from shadowpuppet.errors import FormatError, ShadowPuppetError, reason
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.files.nested import read_nested, write_nested
 from shadowpuppet.motion.limbs import LIMBS
-from shadowpuppet.motion.motion import STATUSES, Mode, MotionFrame
+from shadowpuppet.motion.motion import SCALARS, STATUSES, Mode, MotionFrame
 
 STATE, FRAMES = "checkpoint.npz", "checkpoint.frames"
 MODES = 6
@@ -55,13 +55,14 @@ def frame_bytes(frame: MotionFrame) -> bytes:
     for row, mode in zip(modes, frame.modes):
         row[:] = [LIMBS.index(mode.limb), mode.weight, *mode.joints.ravel()]
     statuses = [STATUSES.index(each) for each in (frame.status, *(frame.limb_status or ()))]
-    parts = ([frame.time, frame.cost, frame.overlap], frame.pose, frame.pose_sd, frame.joints, frame.joint_sd, modes, statuses)
+    head = [frame.time, *(getattr(frame, name) for name in SCALARS)]
+    parts = (head, frame.pose, frame.pose_sd, frame.joints, frame.joint_sd, modes, statuses)
     return np.concatenate([np.asarray(part, float).ravel() for part in parts]).tobytes()
 
 
 def read_frames(folder: Path, number: int, dofs: int, joints: int, limbs: int) -> list[MotionFrame]:
     """The first `number` frames of a run. Raises `FormatError` if there are fewer."""
-    path, width = folder / FRAMES, 4 + 2 * dofs + 6 * joints + MODES * (2 + 3 * joints) + limbs
+    path, width = folder / FRAMES, 2 + len(SCALARS) + 2 * dofs + 6 * joints + MODES * (2 + 3 * joints) + limbs
     try:
         values = np.fromfile(path, float, number * width)
     except OSError as error:
@@ -72,12 +73,12 @@ def read_frames(folder: Path, number: int, dofs: int, joints: int, limbs: int) -
 
 
 def _frame(row: Array, dofs: int, joints: int) -> MotionFrame:
-    sizes = [3, dofs, dofs, 3 * joints, 3 * joints, MODES * (2 + 3 * joints)]
+    sizes = [1 + len(SCALARS), dofs, dofs, 3 * joints, 3 * joints, MODES * (2 + 3 * joints)]
     head, pose, pose_sd, places, places_sd, others, statuses = np.split(row, np.cumsum(sizes))
     modes = [Mode(LIMBS[int(each[0])], float(each[1]), each[2:].reshape(joints, 3)) for each in others.reshape(MODES, -1) if each[0] >= 0]
     status, *limbs = (STATUSES[int(each)] for each in statuses)
-    return MotionFrame(float(head[0]), status, pose, places.reshape(joints, 3), pose_sd, places_sd.reshape(joints, 3), float(head[1]),
-                       float(head[2]), tuple(limbs), modes)
+    return MotionFrame(float(head[0]), status, pose, places.reshape(joints, 3), pose_sd, places_sd.reshape(joints, 3),
+                       limb_status=tuple(limbs), modes=modes, **dict(zip(SCALARS, head[1:].tolist())))
 
 
 def open_frames(folder: Path, frames: Sequence[MotionFrame]) -> BinaryIO:

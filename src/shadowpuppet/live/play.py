@@ -20,7 +20,7 @@ from shadowpuppet.live.display.view import LiveListener
 from shadowpuppet.live.interrupt import Stop
 from shadowpuppet.live.stream.outlet import Outlets, StreamSubject
 from shadowpuppet.motion.body_animation import base_in_world
-from shadowpuppet.motion.motion import Motion, MotionFrame
+from shadowpuppet.motion.motion import SCALARS, Motion, MotionFrame
 
 NAP = 0.05
 """Longest sleep, seconds, between checks for Ctrl-C."""
@@ -91,6 +91,6 @@ def _frames(motion: Motion, loop: bool) -> Iterator[tuple[int, MotionFrame]]:
     for turn in count() if loop else (0,):
         for n in range(len(motion)):
             yield n, MotionFrame(float(motion.times[n]) + turn * length, str(motion.status[n]), motion.poses[n], motion.joints[n],
-                                 cost=float(motion.cost[n]), overlap=float(motion.overlap[n]), limb_status=motion.limb_status[n].tolist())
+                                 limb_status=motion.limb_status[n].tolist(), **{name: float(getattr(motion, name)[n]) for name in SCALARS})
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +21,10 @@ BLANK = ("lost", "absent")
 """Statuses of frames without pose and joints."""
 ROUNDING = 1e-6
 """Rounding error of a time, seconds."""
-PER_FRAME = ("times", "poses", "pose_sd", "joints", "joint_sd", "cost", "overlap", "status", "limb_status")
+SCALARS: Mapping[str, int] = {"cost": 2, "overlap": 6}
+"""What a frame states beside its pose and statuses: a field of `MotionFrame`, of `Motion` and of each tracker's state; and the decimals of
+its column in joints.csv. A field of `Motion` with a default, NaN, is one that older runs lack."""
+PER_FRAME = ("times", "poses", "pose_sd", "joints", "joint_sd", *SCALARS, "status", "limb_status")
 """Fields of a `Motion` with one row a frame."""
 
 
@@ -126,13 +128,14 @@ class Motion:
         _set(self, dof_names=_names("degrees of freedom", self.dof_names), joint_names=_names("joints", self.joint_names),
              times=_times(self.times), status=_statuses(self.status))
         T, D, J = len(self.times), len(self.dof_names), len(self.joint_names)
-        shapes = {"poses": (T, D), "pose_sd": (T, D), "joints": (T, J, 3), "joint_sd": (T, J, 3), "cost": (T,), "overlap": (T,)}
+        shapes = {"poses": (T, D), "pose_sd": (T, D), "joints": (T, J, 3), "joint_sd": (T, J, 3), **dict.fromkeys(SCALARS, (T,))}
         _check_shape("status", self.status, (T,))
         stated = np.size(self.limb_status) > 0
         _set(self, limb_status=_statuses(self.limb_status if stated else np.repeat(self.status[:, None], len(self.limbs), axis=1)))
         _check_shape("limb_status", self.limb_status, (T, len(self.limbs)))
         for name, shape in shapes.items():
-            _set(self, **{name: np.asarray(getattr(self, name), float)})
+            value = np.asarray(getattr(self, name), float)
+            _set(self, **{name: np.full(T, value) if name in SCALARS and not value.ndim else value})
             _check_shape(name, getattr(self, name), shape)
         self._check_blank()
 
@@ -180,9 +183,14 @@ class Motion:
 
     def frames(self) -> Iterator[MotionFrame]:
         """Its frames, one after another."""
-        columns = (self.times.tolist(), self.status.tolist(), self.poses, self.joints, self.pose_sd, self.joint_sd, self.cost.tolist(),
-                   self.overlap.tolist(), self.limb_status.tolist())
-        yield from itertools.starmap(MotionFrame, zip(*columns))
+        scalars = [dict(zip(SCALARS, row)) for row in np.stack([getattr(self, name) for name in SCALARS], 1).tolist()]
+        columns = (self.times.tolist(), self.status.tolist(), self.poses, self.joints, self.pose_sd, self.joint_sd)
+        for each, limbs, own in zip(zip(*columns), self.limb_status.tolist(), scalars):
+            yield MotionFrame(*each, limb_status=limbs, **own)
+
+
+OF_LATER_RUNS = tuple(each.name for each in fields(Motion) if each.default is not MISSING or each.default_factory is not MISSING)
+"""Fields that runs made before lack."""
 
 
 class MotionBuilder:
@@ -204,7 +212,7 @@ class MotionBuilder:
         """Add a frame, later than those before; returns it as stored: all arrays, blank if lost or absent. Raises `ShadowPuppetError`,
         and adds nothing, for a wrong shape, time or status."""
         kept = self._checked(frame)
-        self._rows.extend([kept.time, kept.cost, kept.overlap])
+        self._rows.extend([kept.time, *(getattr(kept, name) for name in SCALARS)])
         for values in (kept.pose, kept.pose_sd, kept.joints, kept.joint_sd):
             self._rows.frombytes(np.asarray(values).tobytes())
         self._limb_status.extend(map(STATUSES.index, kept.limb_status or ()))
@@ -215,14 +223,15 @@ class MotionBuilder:
     def build(self) -> Motion:
         """The motion so far."""
         D, J, T = len(self.dof_names), len(self.joint_names), len(self)
-        width = 3 + 2 * D + 6 * J
+        scalars = 1 + len(SCALARS)
+        width = scalars + 2 * D + 6 * J
         rows = np.array(self._rows)[: T * width].reshape(T, width)  # an interrupt may have left a part of a row
         limbs = np.frombuffer(bytes(self._limb_status), np.uint8)[: T * len(self.limbs)].reshape(T, len(self.limbs))
-        poses, pose_sd, joints, joint_sd = np.split(rows[:, 3:], np.cumsum([D, D, 3 * J]), axis=1)
+        poses, pose_sd, joints, joint_sd = np.split(rows[:, scalars:], np.cumsum([D, D, 3 * J]), axis=1)
         return Motion(body_name=self.body_name, dof_names=self.dof_names, joint_names=self.joint_names, times=rows[:, 0],
-                      cost=rows[:, 1], overlap=rows[:, 2], poses=poses, pose_sd=pose_sd, joints=joints.reshape(T, J, 3),
-                      joint_sd=joint_sd.reshape(T, J, 3), status=np.array(STATUSES)[np.frombuffer(bytes(self._status), np.uint8)],
-                      limb_status=np.array(STATUSES)[limbs])
+                      poses=poses, pose_sd=pose_sd, joints=joints.reshape(T, J, 3), joint_sd=joint_sd.reshape(T, J, 3),
+                      status=np.array(STATUSES)[np.frombuffer(bytes(self._status), np.uint8)], limb_status=np.array(STATUSES)[limbs],
+                      **dict(zip(SCALARS, rows[:, 1:scalars].T)))
 
     def _checked(self, frame: MotionFrame) -> MotionFrame:
         _statuses([frame.status])
@@ -234,12 +243,13 @@ class MotionBuilder:
             value = getattr(frame, name)
             arrays[name] = np.full(shape, np.nan) if value is None or frame.status in BLANK else np.array(value, float)
             _check_shape(name, arrays[name], shape)
-        for name in ("cost", "overlap"):
+        for name in SCALARS:
             _check_shape(name, np.asarray(getattr(frame, name), float), ())
+        arrays |= {name: float(getattr(frame, name)) for name in SCALARS}
         stated = None if frame.status in BLANK else frame.limb_status
         limbs = (frame.status,) * len(self.limbs) if stated is None else tuple(stated)
         _check_shape("limb_status", _statuses(limbs), (len(self.limbs),))
-        return frame._replace(time=float(frame.time), cost=float(frame.cost), overlap=float(frame.overlap), limb_status=limbs, **arrays)
+        return frame._replace(time=float(frame.time), limb_status=limbs, **arrays)
 
 
 def _set(target: object, **values: object) -> None:

@@ -21,7 +21,7 @@ from shadowpuppet.errors import Finding
 from shadowpuppet.geometry import Array
 from shadowpuppet.io.person import Person
 from shadowpuppet.motion.contact.contact import under_feet
-from shadowpuppet.motion.motion import BLANK, Motion, MotionFrame
+from shadowpuppet.motion.motion import BLANK, SCALARS, Motion, MotionFrame
 from shadowpuppet.pipeline.rig import FrameSet
 from shadowpuppet.silhouette.added import BesideBody
 from shadowpuppet.tracking.doubt.doubt import Doubt
@@ -172,12 +172,13 @@ def motion_frame(subject: TrackedSubject[State, Observation, Before], seconds: f
     """The motion of one frame from a tracker's state, without a pose if the person is lost or absent; and the next frame's `before`."""
     if state is None:
         return MotionFrame(seconds, subject.unfound(observation)), None
+    scalars = {name: getattr(state, name) for name in SCALARS}
     if state.status in BLANK:
-        return MotionFrame(seconds, state.status, cost=state.cost, overlap=state.overlap), None
+        return MotionFrame(seconds, state.status, **scalars), None
     joints, (doubt, before) = subject.points(state.pose)[subject.joint_columns], subject.doubt(state, observation, seconds, before)
     modes = [mode._replace(joints=mode.joints[subject.joint_columns]) for mode in doubt.modes]
     found = MotionFrame(seconds, state.status, state.pose, joints, doubt.pose_sd, doubt.joint_sd[subject.joint_columns],
-                        state.cost, state.overlap, doubt.limb_status, modes)
+                        limb_status=doubt.limb_status, modes=modes, **scalars)
     return found, before
 
 

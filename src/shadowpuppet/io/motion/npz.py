@@ -11,13 +11,11 @@ import numpy as np
 from shadowpuppet.errors import FormatError, ShadowPuppetError
 from shadowpuppet.io.files.npz import archive_bytes, check_numbers, read_all_arrays, read_arrays
 from shadowpuppet.io.files.text import write_whole
-from shadowpuppet.motion.motion import JointTable, Motion
+from shadowpuppet.motion.motion import OF_LATER_RUNS, JointTable, Motion
 
 JOINT_ARRAYS = ("times", "joint_names", "joints")
 """Seconds (T,), names (J,), and positions (T, J, 3) in the world, metres, NaN if unknown. A run's motion.npz has these arrays, too."""
 MOTION_ARRAYS = tuple(field.name for field in fields(Motion))
-LATER_ARRAYS = ("limb_status",)
-"""Those that older runs lack."""
 
 
 def read_npz(path: str | Path) -> JointTable:
@@ -40,8 +38,8 @@ def write_npz(path: str | Path, table: JointTable) -> None:
 def read_motion_npz(path: Path) -> Motion:
     """Read a run's motion. Raises `FormatError`."""
     try:
-        arrays: dict[str, Any] = read_all_arrays(path, [name for name in MOTION_ARRAYS if name not in LATER_ARRAYS])
-        arrays |= read_arrays(path, LATER_ARRAYS)
+        arrays: dict[str, Any] = read_all_arrays(path, [name for name in MOTION_ARRAYS if name not in OF_LATER_RUNS])
+        arrays |= read_arrays(path, OF_LATER_RUNS)
         check_numbers(path, sum(array.size for array in arrays.values()))
         arrays["body_name"] = str(arrays["body_name"])
         return Motion(**arrays)

@@ -19,7 +19,7 @@ from shadowpuppet.io.files.text import errors_named, read_text, write_whole
 from shadowpuppet.io.motion.motive import is_motive, joints_of_motive
 from shadowpuppet.io.motion.trc import read_trc, write_trc
 from shadowpuppet.motion.limbs import limbs_of
-from shadowpuppet.motion.motion import STATUSES, JointTable, Motion, MotionFrame
+from shadowpuppet.motion.motion import OF_LATER_RUNS, SCALARS, STATUSES, JointTable, Motion, MotionFrame
 
 AXES = ("_x", "_y", "_z")
 SD = "_sd"
@@ -101,7 +101,7 @@ def run_headers(joints: Sequence[str], dofs: Sequence[str]) -> tuple[list[str], 
     """Columns of joints.csv and angles.csv."""
     positions = [column for name in joints for suffix in ("", SD) for column in joint_columns([name], suffix)]
     limbs = [limb + LIMB_STATUS for limb in limbs_of(joints)]
-    return ["time", *positions, "status", "cost", "overlap", *limbs], ["time", *dofs, *(f"{name}{SD}" for name in dofs)]
+    return ["time", *positions, "status", *SCALARS, *limbs], ["time", *dofs, *(f"{name}{SD}" for name in dofs)]
 
 
 def run_rows(frame: MotionFrame) -> tuple[list[str], list[str]]:
@@ -110,7 +110,8 @@ def run_rows(frame: MotionFrame) -> tuple[list[str], list[str]]:
     positions = np.concatenate([joints, joint_sd], 1).ravel().tolist()
     angles = np.concatenate([np.asarray(frame.pose), np.asarray(frame.pose_sd)]).tolist()
     time = cells([frame.time])
-    row = [*time, *cells(positions), frame.status, *cells([frame.cost], 2), *cells([frame.overlap]), *(frame.limb_status or ())]
+    scalars = [cell for name, decimals in SCALARS.items() for cell in cells([getattr(frame, name)], decimals)]
+    row = [*time, *cells(positions), frame.status, *scalars, *(frame.limb_status or ())]
     return row, [*time, *cells(angles)]
 
 
@@ -152,8 +153,8 @@ def _of_joints(table: Table, names: Sequence[str]) -> dict[str, Any]:
     """The fields of a `Motion` that joints.csv has."""
     joints = tuple(names)
     return {"times": table.times(), "status": _statuses(table, "status"), "limb_status": _limb_statuses(table, joints),
-            "cost": table.numbers(["cost"])[:, 0], "overlap": table.numbers(["overlap"])[:, 0], "joints": _joints(table, joints),
-            "joint_sd": _joints(table, joints, SD)}
+            "joints": _joints(table, joints), "joint_sd": _joints(table, joints, SD),
+            **{name: table.numbers([name])[:, 0] for name in SCALARS if name in table.columns or name not in OF_LATER_RUNS}}
 
 
 def _limb_statuses(table: Table, joints: Sequence[str]) -> np.ndarray:
@@ -177,7 +178,7 @@ def _statuses(table: Table, column: str) -> np.ndarray:
 
 
 def motion_columns(motion: Motion) -> Columns:
-    """A whole motion: `time`, joints (world, metres), their deviations, `status`, `cost`, `overlap`, then degrees of freedom.
+    """A whole motion: `time`, joints (world, metres), their deviations, `status`, `SCALARS`, then degrees of freedom.
 
     Names of degrees of freedom end in their unit, `chest_x [rad]`, so that none is taken for a joint's. Columns without a known value are
     left out.
@@ -185,7 +186,7 @@ def motion_columns(motion: Motion) -> Columns:
     found: Columns = table_columns(motion.table)
     deviations = motion.joint_sd.reshape(len(motion), 3 * len(motion.joint_names)).T
     found |= dict(zip(joint_columns(motion.joint_names, SD), deviations))
-    found |= {"status": motion.status, "cost": motion.cost, "overlap": motion.overlap}
+    found |= {"status": motion.status, **{name: getattr(motion, name) for name in SCALARS}}
     found |= {limb + LIMB_STATUS: column for limb, column in zip(motion.limbs, motion.limb_status.T)}
     for values, suffix in ((motion.poses, ""), (motion.pose_sd, SD)):
         found |= {f"{name}{suffix} [{dof_unit(name)}]": column for name, column in zip(motion.dof_names, values.T)}

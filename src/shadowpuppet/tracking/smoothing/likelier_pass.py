@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array, wrapped
 from shadowpuppet.motion.limbs import joints_of_limbs
-from shadowpuppet.motion.motion import Motion
+from shadowpuppet.motion.motion import SCALARS, Motion
 from shadowpuppet.tracking.smoothing.projection import Points
 
 
@@ -36,7 +36,7 @@ def likelier(forward: Motion, backward: Motion, evidence: Array, points: Points,
     odds = backward_odds(forward, backward, evidence, np.zeros(len(forward), bool) if alone is None else alone)
     back, share = odds > 0, np.exp(-np.logaddexp(0.0, -odds))  # whether, and how probably, the backward pass is right
     chosen = {name: np.where(back.reshape(-1, *(1,) * (getattr(forward, name).ndim - 1)), getattr(backward, name), getattr(forward, name))
-              for name in ("poses", "joints", "cost", "overlap", "status", "limb_status")}
+              for name in ("poses", "joints", *SCALARS, "status", "limb_status")}
     both = np.isfinite(odds)
     if averaged:
         aside = wrapped(np.where(back[:, None], forward.poses, backward.poses) - chosen["poses"])
