@@ -80,7 +80,7 @@ def _look(footage: Footage, film: FilmSurvey, options: Options) -> Look:
     if look.refusal:
         return look
     sits = sitting_cautions(film.masks, [frame.time for frame in sample.frames])
-    look = replace(look, body=body_for(film.masks, bool(sits)))
+    look = replace(look, body=body_for(film.masks))
     whole = options.tracker.body if options.body_is_known else look.body
     posture = feet_cautions({camera.name: look.quality.border["bottom"]}) if whole in WHOLE else sits
     posture += [whole_person()] if whole != options.tracker.body else []
