@@ -80,6 +80,10 @@ def test_limbs_have_statuses_of_their_own_or_their_frames(words, data):
     motion = builder.build()
     assert motion.limbs == ("trunk", "left_arm", "right_arm")
     assert list(map(tuple, motion.limb_status.tolist())) == wanted
+    unvouched = [word == "tracked" and "tracked" not in own for word, own in zip(words, wanted, strict=True)]
+    assert motion.status.tolist() == ["uncertain" if unvouched[i] else word for i, word in enumerate(words)]
+    vouched_for_nothing = dataclasses.replace(motion, limb_status=np.full((len(words), 3), "predicted"))
+    assert "tracked" not in vouched_for_nothing.status
     for k, limb in enumerate(motion.limbs):
         counts = motion.limb_status_counts[limb]
         assert sum(counts.values()) == len(words)

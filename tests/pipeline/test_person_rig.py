@@ -164,11 +164,17 @@ def test_silhouettes_of_films_that_have_lost_detail_hold_the_body_less(untaught,
 
 
 def test_an_estimated_height_is_doubted_where_the_body_fits_badly():
-    assert person_rig._doubts(1.8, 0.85) == ()
+    assert person_rig._doubts(1.8, 0.85) == person_rig._doubts(1.9, 0.85) == ()
     (said,) = person_rig._doubts(1.83, 0.72)
     assert "height, 1.83 m, may be off by 20 cm: the body overlaps the silhouettes by 0.72 only" in said
     assert (said.short, said.severity) == ("height is uncertain: give --height", NOTED)
     assert len(said.short.split()) <= 10
+
+
+@pytest.mark.parametrize("overlap", [0.72, 0.9, np.nan])
+def test_a_height_that_hardly_anybody_has_is_doubted_however_well_it_fits(overlap):
+    (said,) = person_rig._doubts(2.02, overlap)
+    assert (said.short, said.severity) == ("a height of 2.02 m is unlikely: give --height", HARMFUL)
 
 
 def test_a_front_that_hardly_fits_better_is_doubted():

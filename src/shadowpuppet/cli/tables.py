@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from shadowpuppet.pipeline.findings.verdict import Verdict
 
 
-SENSES = {"uncertain": " (the outline fits badly)", "predicted": " (bridged or unseen)", "lost": " (nothing fits)",
+SENSES = {"uncertain": " (the outline fits badly, or no limb is sure)", "predicted": " (bridged or unseen)", "lost": " (nothing fits)",
           "absent": " (nobody in the picture)"}
 """Meaning of a frame's status, beside it in a table; `tracked` needs no words."""
 

@@ -207,9 +207,14 @@ def play(run: Annotated[Path, Parameter(help="Folder that `track` or `live` made
         play_run(run, open_outlets(chosen), listener, speed=speed, loop=loop)
 
 
+PAGE = "view.html"
+"""The page in the folder of the demo's second run."""
+
+
 def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and runs.")] = Path("shadowpuppet-demo"),
          config: Config = None, quiet: Quiet = False, flags: DemoFlags = None) -> None:
-    """Make two sample recordings with known truth, with one camera and with four, track them, and name the pictures to open.
+    """Make two sample recordings with known truth, with one camera and with four, track them, and name the pictures to open, and a page that
+    shows the second run in space.
 
     Needs no data and no network.
     """
@@ -217,14 +222,17 @@ def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and 
 
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.synthesize import run_demo
+    from shadowpuppet.viewer.scene.open_any import open_scene
+    from shadowpuppet.viewer.web.page import write_page
 
     options = replace(options_from(flags, config), overlay=True)
     with terminal(quiet, folder) as listener:
         summaries = run_demo(folder, options, listener)
+        write_page(summaries[-1].folder / PAGE, open_scene(summaries[-1].folder, Options()), True, listener)
     for summary in () if quiet else summaries:
         say("")
         say(f"{'several cameras' if summary.metrics.get('cameras', 1) > 1 else 'one camera'}")
-        _show_run(summary.folder, summary.metrics, "overlay.png")
+        _show_run(summary.folder, summary.metrics, "overlay.png", *([PAGE] if summary is summaries[-1] else []))
     if not quiet:
         _show_next(folder)
 
@@ -234,6 +242,8 @@ def _show_next(folder: Path) -> None:
     run = folder / "run-ring"
     say("")
     say("A limb that is named above as doubtful is dashed in overlay.mp4, and has its own status in joints.csv.")
+    say(f"{PAGE} shows the motion in space, in any browser. The sizes of these people come from reference pictures and training motion; "
+        "without them errors are larger.")
     show_next(typed("view", run), typed("evaluate", run, "--report", folder / "run-ring.html"), typed("export", run, "--to", "bvh,trc"),
               typed("track", "YOUR-FILM.mp4", "--fov", "65", "--height", "1.75", "--overlay"))
 

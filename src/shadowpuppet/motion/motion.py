@@ -119,7 +119,7 @@ class Motion:
     overlap: Array
     """Intersection over union of model and silhouette, of shape (T,)."""
     status: NDArray[np.str_]
-    """Of `STATUSES`, of shape (T,)."""
+    """Of `STATUSES`, of shape (T,): `uncertain` where a frame is given as `tracked`, but none of its limbs is."""
     limb_status: NDArray[np.str_] = field(default_factory=lambda: np.empty((0, 0), str))
     """Of `STATUSES`, of shape (T, K), for each of `limbs`; without: as the frames'."""
 
@@ -133,6 +133,8 @@ class Motion:
         stated = np.size(self.limb_status) > 0
         _set(self, limb_status=_statuses(self.limb_status if stated else np.repeat(self.status[:, None], len(self.limbs), axis=1)))
         _check_shape("limb_status", self.limb_status, (T, len(self.limbs)))
+        unvouched = (self.status == "tracked") & ~(self.limb_status == "tracked").any(1) & (len(self.limbs) > 0)
+        _set(self, status=np.where(unvouched, "uncertain", self.status))
         for name, shape in shapes.items():
             value = np.asarray(getattr(self, name), float)
             _set(self, **{name: np.full(T, value) if name in SCALARS and not value.ndim else value})
@@ -216,7 +218,7 @@ class MotionBuilder:
         for values in (kept.pose, kept.pose_sd, kept.joints, kept.joint_sd):
             self._rows.frombytes(np.asarray(values).tobytes())
         self._limb_status.extend(map(STATUSES.index, kept.limb_status or ()))
-        self._status.append(STATUSES.index(frame.status))
+        self._status.append(STATUSES.index(kept.status))
         self._last = kept.time
         return kept
 
@@ -249,7 +251,8 @@ class MotionBuilder:
         stated = None if frame.status in BLANK else frame.limb_status
         limbs = (frame.status,) * len(self.limbs) if stated is None else tuple(stated)
         _check_shape("limb_status", _statuses(limbs), (len(self.limbs),))
-        return frame._replace(time=float(frame.time), limb_status=limbs, **arrays)
+        status = "uncertain" if frame.status == "tracked" and limbs and "tracked" not in limbs else frame.status
+        return frame._replace(time=float(frame.time), status=status, limb_status=limbs, **arrays)
 
 
 def _set(target: object, **values: object) -> None:

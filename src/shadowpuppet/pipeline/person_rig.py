@@ -39,7 +39,7 @@ from shadowpuppet.tracking.doubt.variance import variance_model
 from shadowpuppet.tracking.keypoints.definitions import landmarks_of
 from shadowpuppet.tracking.keypoints.stature import height_by_bones
 from shadowpuppet.tracking.multiview.bundle_adjustment import Deviations
-from shadowpuppet.tracking.multiview.height_estimation import FirstFrame, SeenHeight, estimate_height
+from shadowpuppet.tracking.multiview.height_estimation import FirstFrame, SeenHeight, estimate_height, is_unlikely
 from shadowpuppet.tracking.multiview.settings import MultiviewSettings, for_rate, for_smeared
 from shadowpuppet.tracking.multiview.size_estimation import (
     Front,
@@ -245,6 +245,10 @@ def _front_doubts(front: Front | None) -> tuple[Finding, ...]:
 
 def _doubts(height: float, overlap: float) -> tuple[Finding, ...]:
     """Doubts about an estimated height, metres, of a body that overlaps the silhouettes by `overlap`, NaN without any."""
+    if is_unlikely(height):
+        return (Finding.of("the person's height as seen is {height:.2f} m, more than 99 adults in 100 have: furniture or a shadow makes "
+                           "silhouettes larger, or the calibration's scale is wrong; give --height",
+                           "a height of {height:.2f} m is unlikely: give --height", HARMFUL, height=height),)
     if np.isnan(overlap) or overlap >= SURE_OVERLAP:
         return ()
     return (Finding.of("the person's height, {height:.2f} m, may be off by 20 cm: the body overlaps the silhouettes by {overlap:.2f} only; "

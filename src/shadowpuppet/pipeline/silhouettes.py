@@ -166,4 +166,4 @@ def clean_settings(asked: SilhouetteSettings) -> SilhouetteSettings:
 
 
 def _short(path: Path | None) -> str:
-    return f"{path.parent.name}/{path.name}" if path is not None else ""
+    return Path(*path.parts[-2:]).as_posix() if path is not None else ""

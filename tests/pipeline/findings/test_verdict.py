@@ -135,8 +135,8 @@ def test_errors_that_intervals_lead_one_to_expect_are_met_by_draws():
 
 @pytest.mark.parametrize(("run", "word", "reason"), [
     (motion(0.03), "good", None),
-    (motion(0.03, statuses="tttttttlaa"), "doubtful", "person lost in 12 % of frames: look at overlay.mp4 (--overlay)"),
-    (motion(0.03, statuses="ttlllaaaaa"), "bad", "person lost in 60 % of frames: look at overlay.mp4 (--overlay)"),
+    (motion(0.03, statuses="tttttttlaa"), "doubtful", "person lost in 12 % of frames: look where (`view`)"),
+    (motion(0.03, statuses="ttlllaaaaa"), "bad", "person lost in 60 % of frames: look where (`view`)"),
     (motion(0.03, statuses="aaaaaaaaaa"), "bad", "nobody was seen: film the empty scene and the person"),
     (motion(0.03, doubtful=2), "good", "left arm doubtful in 20 % of frames"),
     (motion(0.03, doubtful=8), "doubtful", "left arm doubtful in 80 % of frames"),
@@ -200,7 +200,7 @@ def test_frames_in_which_every_camera_was_blind_are_no_error_of_the_joints():
     black = [{"camera": "cam", "why": "blind", "frames": 1, "from_s": 9.0, "to_s": 9.0}]
     assert (expected_error(run), expected_error(run, blind_frames(run, black, 1))) == pytest.approx((0.136, 0.096), abs=1e-3)
     assert verdict_of_run(LOOK, run).word == "bad"
-    assert verdict_of_run(LOOK, run, black)[:2] == ("doubtful", ("person lost in 10 % of frames: look at overlay.mp4 (--overlay)",
+    assert verdict_of_run(LOOK, run, black)[:2] == ("doubtful", ("person lost in 10 % of frames: look where (`view`)",
                                                              "camera 'cam' blind from 9.0 s: look at its film"))
     assert not blind_frames(run, black, 2).any()
     assert not blind_frames(run, [black[0] | {"why": "frozen"}], 1).any()

@@ -198,7 +198,7 @@ def _losses(motion: Motion) -> Iterator[Finding]:
     if not (motion.status != "absent").any():
         yield Finding("nobody was seen in any frame", "nobody was seen: film the empty scene and the person", RUINOUS)
     elif (lost := lost_share(motion)) > OFTEN_LOST:
-        yield _brief("person lost in {percent:.0f} % of frames: look at overlay.mp4 (--overlay)",
+        yield _brief("person lost in {percent:.0f} % of frames: look where (`view`)",
                      RUINOUS if lost > MOSTLY_LOST else HARMFUL, percent=100 * lost)
 
 

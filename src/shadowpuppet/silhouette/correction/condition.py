@@ -76,10 +76,10 @@ class FilmCondition:
         if self.moved_since is not None:
             when = "throughout" if self.moved_frames == 1 else f"from about {self.moved_since:.1f} s on"
             yield Finding.of(f"the camera is up to {{pixels:.1f}} pixels from where it saw the empty scene, {when}: {remedy}; fix the "
-                             "tripod", "camera moved by {pixels:.0f} pixels: fix the tripod", NOTED, pixels=self.moved)
+                             "tripod", "camera moved by {pixels:.1f} pixels: fix the tripod", NOTED, pixels=self.moved)
         elif self.moved:
             yield Finding.of(f"the camera moves by up to {{pixels:.1f}} pixels, in {{percent:.0f}} % of the frames: {remedy}; fix the "
-                             "tripod", "camera shakes by {pixels:.0f} pixels: fix the tripod", NOTED, pixels=self.moved,
+                             "tripod", "camera shakes by {pixels:.1f} pixels: fix the tripod", NOTED, pixels=self.moved,
                              percent=100 * self.moved_frames)
         percent = 100 * self.unmatched
         if self.unmatched > WARN_UNMATCHED and recovered:

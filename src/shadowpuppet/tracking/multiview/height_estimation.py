@@ -35,6 +35,8 @@ large bodies fit, up to the walls of the hull."""
 PENALTY, DEVIATION = 0.02, 0.1
 """Relative cost of a height that deviates from the average by `DEVIATION` (m), that of adults in ANSUR II (Gordon et al. 2014), women and
 men together; it grows with the square, and is bounded for the sake of children."""
+TALL = 2.33
+"""Deviations by which a height is unlikely: 99 adults in 100 are less tall."""
 
 
 class FirstFrame(NamedTuple):
@@ -122,3 +124,8 @@ def extents(points: Array) -> Array:
     middle = points - points.mean(0)
     along = np.sort(middle @ np.linalg.svd(middle, full_matrices=False)[2].T, axis=0)
     return np.sort(along[-1 - STRAY] - along[STRAY])[::-1]
+
+
+def is_unlikely(height: float) -> bool:
+    """Whether hardly any adult has a height, metres."""
+    return height > AVERAGE_HEIGHT + TALL * DEVIATION

@@ -7,12 +7,11 @@ from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array
 from shadowpuppet.motion.interpolation import true_runs
+from shadowpuppet.motion.motion import ROUNDING
 from shadowpuppet.tracking.smoothing.fixed_interval import LEAST, PACE
 
 FASTEST = 8.0
 """Mean speed (m/s) of a joint over a gap above which the gap is not bridged: the person before and after cannot both be right."""
-ROUNDING = 1e-6
-"""Of times (s)."""
 STRAY = 0.25
 """Factor of the bow, half the acceleration times the times to both ends, by which a bridged joint may stray; on made recordings the
 intervals cover as without gaps."""
