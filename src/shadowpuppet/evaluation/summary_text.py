@@ -38,14 +38,14 @@ def overlap_sense(overlap: float) -> str:
 
 
 def doubt_text(metrics: Mapping[str, Any]) -> str | None:
-    """Share of frames in which each limb is doubtful, and number of frames in which the outline fits; None if unknown or without frames."""
-    limbs, frames = metrics.get("limb_status"), metrics["frames"]
-    if not limbs or not frames:
+    """Share of frames in which each limb is doubtful; None if unknown or without frames."""
+    limbs = metrics.get("limb_status")
+    if not limbs or not metrics["frames"]:
         return None
     shares = {limb.replace("_", " "): sum(counts.get(status, 0) for status in DOUBTFUL) / max(_placed(counts), 1)
               for limb, counts in limbs.items()}
     doubtful = ", ".join(f"{limb} in {_percent(share)}" for limb, share in shares.items() if share).replace(" in ", " doubtful in ", 1)
-    return f"{doubtful or 'no limb doubtful'}; the outline as a whole fits in {metrics['status'].get('tracked', 0)} of {frames} frames"
+    return doubtful or "no limb doubtful"
 
 
 def _placed(counts: Mapping[str, int]) -> int:
