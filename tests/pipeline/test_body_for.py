@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shadowpuppet.io.run import read_run
-from shadowpuppet.pipeline.findings.body import MOVES, body_for
+from shadowpuppet.pipeline.findings.body import MOVES, body_for, walking_cautions
 from shadowpuppet.pipeline.options import Options, make_options
 from shadowpuppet.pipeline.prepare import as_before, for_person, look_at
 from shadowpuppet.pipeline.rig import open_rig
@@ -33,13 +33,25 @@ def person(x: float = 100, low: float = 200, legs: bool = True, squats: float = 
     ([person(low=low) for low in np.linspace(150, 150 + 2 * MOVES * HIGH, 9)], "anatomical"),
     ([person(squats=drop) for drop in np.linspace(0, 2 * MOVES * HIGH, 9)], "anatomical"),
     ([person(legs=False, squats=drop) for drop in np.linspace(0, 2 * MOVES * HIGH, 9)], "rounded"),  # sits down behind a table
-    ([person(x, legs=False) for x in np.linspace(60, 60 + 2 * MOVES * HIGH, 9)], "anatomical"),  # walks behind one
-    ([person(x, low=260) for x in np.linspace(60, 120, 9)], "anatomical"),  # the feet are cut off
+    ([person(x, legs=False) for x in np.linspace(60, 120, 9)], "rounded"),  # walks behind one
+    ([person(x, low=260) for x in np.linspace(60, 120, 9)], "rounded"),  # the feet are cut off
+    ([person(x, low=260 if x < 110 else 200) for x in np.linspace(60, 120, 9)], "anatomical"),  # but not always
     ([np.zeros((240, 240), bool)] * 3, "rounded"),
     ([], "rounded"),
 ])  # fmt: skip
 def test_who_does_not_stay_in_one_place_is_tracked_whole(masks, body):
     assert body_for(masks) == body
+
+
+@pytest.mark.parametrize(("masks", "said"), [
+    ([person(x, legs=False) for x in np.linspace(60, 60 + 2 * MOVES * HIGH, 9)], 1),
+    ([person(x, legs=False) for x in np.linspace(60, 60 + MOVES * HIGH, 9)], 0),
+    ([person(60 if n else 160, legs=False) for n in range(9)], 0),  # somebody passes
+    ([np.zeros((240, 240), bool)] * 3, 0),
+])  # fmt: skip
+def test_who_goes_about_with_feet_unseen_is_at_an_unknown_distance(masks, said):
+    found = walking_cautions(masks)
+    assert [each.short for each in found] == ["person goes about, feet unseen: distance unknown; step back"] * said
 
 
 def test_a_body_that_is_said_or_a_paper_s_or_given_sizes_or_references_is_kept(tmp_path):

@@ -79,8 +79,8 @@ class Options:
     """Distance from the camera to the middle of the body at the start, metres; one camera only. Overrides recording.toml."""
     body: BodyName | None = None
     """Body model in place of the tracker's own: an upper body (cardbox, cardbox_bends, boxes or rounded; one camera only) or a whole body
-    (anatomical or cylinders). By default anatomical with several cameras, and with one where the person walks, squats or sits down, unless
-    sizes are given; else rounded; the paper's with the preset of a paper."""
+    (anatomical or cylinders). By default anatomical with several cameras, and with one where the person walks, squats or sits down and feet
+    are seen, unless sizes are given; else rounded; the paper's with the preset of a paper."""
     person: Path | None = None
     """Sizes of the person, saved by an earlier run or by `fit-person` (person.toml)."""
     prior: Path | None = None

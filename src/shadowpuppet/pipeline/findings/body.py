@@ -11,8 +11,8 @@ import numpy as np
 
 from shadowpuppet.body.models import BodyName
 from shadowpuppet.camera.mask import Mask
-from shadowpuppet.errors import NOTED, Finding
-from shadowpuppet.pipeline.findings.cautions import MOSTLY
+from shadowpuppet.errors import HARMFUL, NOTED, Finding
+from shadowpuppet.pipeline.findings.cautions import AT_TIMES, MOSTLY
 from shadowpuppet.tracking.monocular.standing_place import soles_row
 from shadowpuppet.tracking.silhouette_cost import Soles
 
@@ -23,21 +23,40 @@ FEET = 0.5
 MOVES = 0.155
 """Least way of a person who does not stay in one place, over the silhouette's height, between the 20th and the 80th per cent of the masks:
 what is in the picture for a moment moves nobody. On 58 made films in which people stand 0.15 at most, an intruder beside them among these;
-0.16 at least on 20 in which they walk, squat, kneel or sit down."""
+0.16 at least on 20 in which they walk, squat, kneel or sit down. Of walkers whose feet are never seen the whole body is no better."""
 
 
 def body_for(masks: Sequence[Mask]) -> BodyName:
-    """The body for a film with masks (H, W) of moments that are spread over it. The outline's middle tells who walks; soles and crown who
-    comes nearer, sits down or squats, where feet are seen: without them the lower end is a table's, and the upper one may be hands."""
+    """The body for a film with masks (H, W) of moments that are spread over it: whole if feet are seen, at least at times, of a person who
+    moves. Where they are mostly seen, soles and crown tell, too, who comes nearer, sits down or squats; else the lower end is the picture's
+    or a table's, and the upper one may be hands."""
     shown = [mask for mask in masks if mask.any()]
-    if not shown:
-        return "rounded"
     soles = [found.row for mask in shown if (found := _feet(mask)) is not None]
-    tops = [mask.any(1).argmax() for mask in shown]
-    heights = [len(mask) - mask[::-1].any(1).argmax() - top for mask, top in zip(shown, tops, strict=True)]
-    rows = [soles, tops] if len(soles) >= (1 - MOSTLY) * len(shown) else []
-    ways = [np.diff(np.percentile(each, [20, 80])).item() for each in ([np.median(np.nonzero(mask)[1]) for mask in shown], *rows)]
-    return "anatomical" if max(ways) > MOVES * np.median(heights) else "rounded"
+    if not soles or len(soles) < AT_TIMES * len(shown):
+        return "rounded"
+    rows = [soles, [mask.any(1).argmax() for mask in shown]] if len(soles) >= (1 - MOSTLY) * len(shown) else []
+    return "anatomical" if _goes_about(shown) or any(_is_way(each, shown) for each in rows) else "rounded"
+
+
+def walking_cautions(masks: Sequence[Mask]) -> list[Finding]:
+    """That a person whose upper body is tracked goes about, by masks (H, W) as in `body_for`."""
+    shown = [mask for mask in masks if mask.any()]
+    if not shown or not _goes_about(shown):
+        return []
+    return [Finding("the person goes about in the picture, whose feet are not seen: an upper body stays at the distance where it was "
+                    "measured, and all depths are as wrong as that changes; step back until the feet are seen",
+                    "person goes about, feet unseen: distance unknown; step back", HARMFUL)]
+
+
+def _goes_about(shown: Sequence[Mask]) -> bool:
+    """Whether the middle of a person's silhouettes (H, W) moves."""
+    return _is_way([float(np.median(np.nonzero(mask)[1])) for mask in shown], shown)
+
+
+def _is_way(places: Sequence[float], shown: Sequence[Mask]) -> bool:
+    """Whether places in a picture, pixels, are those of a person who moves, whose silhouettes (H, W) are `shown`."""
+    heights = [len(mask) - mask[::-1].any(1).argmax() - mask.any(1).argmax() for mask in shown]
+    return bool(np.diff(np.percentile(places, [20, 80])).item() > MOVES * np.median(heights))
 
 
 def whole_person() -> Finding:

@@ -12,7 +12,7 @@ from shadowpuppet.body.anthropometry import AVERAGE_HEIGHT
 from shadowpuppet.body.models import WHOLE
 from shadowpuppet.camera.mask import Mask, may_be_person
 from shadowpuppet.errors import HARMFUL, NOTED, Finding
-from shadowpuppet.pipeline.findings.body import body_for, whole_person
+from shadowpuppet.pipeline.findings.body import body_for, walking_cautions, whole_person
 from shadowpuppet.pipeline.findings.cautions import (
     added_cautions,
     condition_cautions,
@@ -82,7 +82,7 @@ def _look(footage: Footage, film: FilmSurvey, options: Options) -> Look:
     sits = sitting_cautions(film.masks, [frame.time for frame in sample.frames])
     look = replace(look, body=body_for(film.masks))
     whole = options.tracker.body if options.body_is_known else look.body
-    posture = feet_cautions({camera.name: look.quality.border["bottom"]}) if whole in WHOLE else sits
+    posture = feet_cautions({camera.name: look.quality.border["bottom"]}) if whole in WHOLE else sits or walking_cautions(film.masks)
     posture += [whole_person()] if whole != options.tracker.body else []
     several = _several_people(film, HARMFUL if options.people is None else NOTED)
     doubts = (*several, *posture, *_doubts(look, footage, whole in WHOLE), *film_cautions(footage),
