@@ -213,8 +213,8 @@ PAGE = "view.html"
 
 def demo(*, folder: Annotated[Path, output("Folder that gets the recordings and runs.")] = Path("shadowpuppet-demo"),
          config: Config = None, quiet: Quiet = False, flags: DemoFlags = None) -> None:
-    """Make two sample recordings with known truth, with one camera and with four, track them, and name the pictures to open. A page shows the
-    second run in space.
+    """Make two sample recordings with known truth, with one camera and with four, track them, and name the pictures to open. A page shows
+    the second run in space.
 
     Needs no data and no network.
     """

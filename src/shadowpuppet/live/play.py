@@ -20,7 +20,7 @@ from shadowpuppet.live.display.view import LiveListener
 from shadowpuppet.live.interrupt import Stop
 from shadowpuppet.live.stream.outlet import Outlets, StreamSubject
 from shadowpuppet.motion.body_animation import base_in_world
-from shadowpuppet.motion.motion import SCALARS, Motion, MotionFrame
+from shadowpuppet.motion.motion import Motion, MotionFrame
 
 NAP = 0.05
 """Longest sleep, seconds, between checks for Ctrl-C."""
@@ -89,8 +89,5 @@ def _frames(motion: Motion, loop: bool) -> Iterator[tuple[int, MotionFrame]]:
     step = float(np.median(np.diff(motion.times))) if len(motion) > 1 else 1.0
     length = float(motion.times[-1] - motion.times[0]) + step
     for turn in count() if loop else (0,):
-        for n in range(len(motion)):
-            yield n, MotionFrame(float(motion.times[n]) + turn * length, str(motion.status[n]), motion.poses[n], motion.joints[n],
-                                 limb_status=motion.limb_status[n].tolist(), **{name: float(getattr(motion, name)[n]) for name in SCALARS})
-
-
+        for n, frame in enumerate(motion.frames()):
+            yield n, frame._replace(time=frame.time + turn * length, pose_sd=None, joint_sd=None)
