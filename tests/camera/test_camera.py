@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -151,6 +152,9 @@ def test_a_field_of_view_reaches_the_picture_s_edges_from_a_level_camera():
     assert math.degrees(math.atan(right[0])) == pytest.approx(30)
     assert left[0] == -right[0]
     assert not cam.oriented
+    assert not cam.lens_measured
+    assert replace(cam, distortion=np.array([0.1, 0, 0, 0])).lens_measured
+    assert replace(cam, matrix=cam.matrix + np.array([[0, 0, 2.0], [0, 0, 0], [0, 0, 0]])).lens_measured
     above, ahead = cam.project([[0, 3.0, 1.0], [0, 3.0, 0]])  # z is up, y ahead
     assert above[1] < ahead[1]
     np.testing.assert_allclose(ahead, [159.5, 119.5])

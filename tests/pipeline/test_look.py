@@ -45,6 +45,17 @@ def test_the_view_of_a_phone_held_across_is_doubted_in_an_upright_film(recording
     assert any("--fov 40" in str(doubt) for doubt in doubts) == doubted
 
 
+@pytest.mark.parametrize(("lens", "short", "guessed"), [
+    (False, "camera not calibrated: depths are rough; give --calibration", True),
+    (True, "camera's place not calibrated: depths are rough", False),
+])
+def test_what_is_known_of_a_lens_is_not_called_a_guess(recording, look, lens, short, guessed):
+    doubts = camera_doubts(replace(look, calibrated=False, lens_calibrated=lens), open_footage(recording, Options()), whole=False)
+    (said,) = [each for each in doubts if "place is not calibrated" in each]
+    assert said.short == short
+    assert ("a field of view of 60 degrees and no distortion" in said) == guessed
+
+
 def test_a_look_says_what_is_there(recording, look):
     assert look.recording == str(recording)
     assert (look.camera, look.size, look.worked_size, look.frames) == ("cam", made.SIZE, made.SIZE, made.FRAMES)

@@ -80,6 +80,11 @@ class Camera:
         """Horizontal field of view, rad, without lens distortion."""
         return float(2 * np.arctan(self.size[0] / 2 / self.matrix[0, 0]))
 
+    @property
+    def lens_measured(self) -> bool:
+        """Whether more of the lens is known than its field of view: distortion, or a centre beside the picture's (`from_fov`)."""
+        return bool(np.any(self.distortion)) or not np.allclose(self.matrix[:2, 2], (np.array(self.size) - 1) / 2)
+
     @classmethod
     def from_fov(cls, size: tuple[int, int], fov: float, name: str = "cam", pixel: float = 1.0) -> Camera:
         """A level camera at the world's origin, known only by its horizontal field of view (radians) and the width of its pixels over their

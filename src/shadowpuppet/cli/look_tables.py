@@ -43,7 +43,7 @@ def _told_by(key: str) -> str:
 
 def _camera(look: Look) -> str:
     scaled = "" if look.worked_size == look.size else f", scaled to {look.worked_size[0]} x {look.worked_size[1]}"
-    how = "calibrated" if look.calibrated else "not calibrated"
+    how = "calibrated" if look.calibrated else "its lens calibrated, not its place" if look.lens_calibrated else "not calibrated"
     return f"{look.camera}, {look.size[0]} x {look.size[1]} pixels{scaled}, {look.fov:.0f} degrees wide, {how}"
 
 

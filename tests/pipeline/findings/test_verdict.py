@@ -32,9 +32,9 @@ from shadowpuppet.silhouette.quality import MaskQuality
 JOINTS = ("pelvis", "left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
 QUALITY = MaskQuality(frames=40, area=0.1, area_change=0.0, area_jumps=0.0, flicker=0.0, specks=0.0, speck_area=0.0, holes=0.0,
                       hole_area=0.0, border=dict.fromkeys(("left", "top", "right", "bottom"), 0.0), empty=0, full=0)
-LOOK = Look(recording="film", camera="cam", size=(320, 240), worked_size=(320, 240), fov=60.0, calibrated=True, frames=100, looked_at=100,
-            rate=25.0, jitter=0.0, scale="height 1.80 m", background="film", key="both", area=0.1, plain_area=None, exact_overlap=None,
-            exact_overlap_plain=None, quality=QUALITY)
+LOOK = Look(recording="film", camera="cam", size=(320, 240), worked_size=(320, 240), fov=60.0, calibrated=True, lens_calibrated=True,
+            frames=100, looked_at=100, rate=25.0, jitter=0.0, scale="height 1.80 m", background="film", key="both", area=0.1,
+            plain_area=None, exact_overlap=None, exact_overlap_plain=None, quality=QUALITY)
 
 CAMERA = Camera.from_fov((320, 240), 1.0)
 """At the origin, with depth along y."""

@@ -73,6 +73,7 @@ def _look(footage: Footage, film: FilmSurvey, options: Options) -> Look:
     plain = [mask for frame in sample.frames if (mask := film.silhouettes.plain(frame)) is not None]
     look = Look(
         **vars(film.look), recording=str(footage.recording.path), camera=camera.name, calibrated=camera.oriented,
+        lens_calibrated=camera.lens_measured,
         looked_at=len(sample.times), jitter=sample.jitter, scale=known_scale(footage), area=_share(film.masks),
         plain_area=_share(plain) if plain else None, exact_overlap_plain=mean_overlap(plain, film.exact),
         refusal=recovery_doubt(film.silhouettes) or film.look.quality.refusal(),
@@ -109,8 +110,10 @@ def _doubts(look: Look, footage: Footage, whole: bool) -> list[Finding]:
     """What is in doubt before anything is tracked; `whole`: whether a whole body is, whose soles show the distance."""
     doubts, subject = list[Finding](), footage.recording.subject
     if not look.calibrated:
-        doubts.append(Finding.of("no calibration: the camera is taken for level, with a field of view of {fov:.0f} degrees and no "
-                                 "distortion; depths and the world's axes are as good as that; give a calibration.toml",
+        lens = "" if look.lens_calibrated else ", with a field of view of {fov:.0f} degrees and no distortion"
+        doubts.append(Finding.of(f"the camera's place is not calibrated: it is taken for level{lens}; depths and the world's axes are as good "
+                                 "as that; give a calibration.toml with it",
+                                 "camera's place not calibrated: depths are rough" if look.lens_calibrated else
                                  "camera not calibrated: depths are rough; give --calibration", NOTED, fov=look.fov))
     if not look.calibrated and look.size[0] < look.size[1] and look.fov > WIDE:
         doubts.append(Finding.of("the film is upright: {fov:.0f} degrees are what a phone sees held across, held upright it sees about "

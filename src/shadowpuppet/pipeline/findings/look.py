@@ -94,7 +94,9 @@ class Look(RecordingLook, FilmLook):
     camera: str
     """The camera's name."""
     calibrated: bool
-    """False if only the field of view is known."""
+    """Whether the camera's place is known."""
+    lens_calibrated: bool
+    """Whether more of the lens is known than its field of view."""
     looked_at: int
     """Number of frames that were read for this look."""
     jitter: float
