@@ -51,7 +51,7 @@ def test_the_view_of_a_phone_held_across_is_doubted_in_an_upright_film(recording
 ])
 def test_what_is_known_of_a_lens_is_not_called_a_guess(recording, look, lens, short, guessed):
     doubts = camera_doubts(replace(look, calibrated=False, lens_calibrated=lens), open_footage(recording, Options()), whole=False)
-    (said,) = [each for each in doubts if "place is not calibrated" in each]
+    (said,) = [each for each in doubts if "no calibration of the camera's place" in each]
     assert said.short == short
     assert ("a field of view of 60 degrees and no distortion" in said) == guessed
 
@@ -208,7 +208,7 @@ def test_an_unknown_distance_before_a_camera_that_was_not_calibrated_is_no_good_
 def test_a_guessed_camera_is_said(recording, tmp_path):
     bare = made.copied(recording, tmp_path / "bare", without=["calibration.toml"])
     said = doubts(bare, fov=60.0, initialization=QUICK)
-    assert "no calibration: the camera is taken for level, with a field of view of 60 degrees" in said
+    assert "no calibration of the camera's place: it is taken for level, with a field of view of 60 degrees" in said
     background = str(recording / "background" / "cam.mp4")
     values = {"fov": 60, "height": 1.7, "distance": 2, "background": background, "initialization": QUICK}
     film = look_at(recording / "video" / "cam.mp4", make_options(values))

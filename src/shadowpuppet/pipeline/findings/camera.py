@@ -110,11 +110,11 @@ def _doubts(look: Look, footage: Footage, whole: bool) -> list[Finding]:
     """What is in doubt before anything is tracked; `whole`: whether a whole body is, whose soles show the distance."""
     doubts, subject = list[Finding](), footage.recording.subject
     if not look.calibrated:
-        lens = "" if look.lens_calibrated else ", with a field of view of {fov:.0f} degrees and no distortion"
-        doubts.append(Finding.of(f"the camera's place is not calibrated: it is taken for level{lens}; depths and the world's axes are as good "
-                                 "as that; give a calibration.toml with it",
-                                 "camera's place not calibrated: depths are rough" if look.lens_calibrated else
-                                 "camera not calibrated: depths are rough; give --calibration", NOTED, fov=look.fov))
+        guessed = "" if look.lens_calibrated else ", with a field of view of {fov:.0f} degrees and no distortion"
+        short = "camera's place not calibrated: depths are rough" if look.lens_calibrated else (
+            "camera not calibrated: depths are rough; give --calibration")
+        doubts.append(Finding.of(f"no calibration of the camera's place: it is taken for level{guessed}; depths and the world's axes are "
+                                 "as good as that; give a calibration.toml", short, NOTED, fov=look.fov))
     if not look.calibrated and look.size[0] < look.size[1] and look.fov > WIDE:
         doubts.append(Finding.of("the film is upright: {fov:.0f} degrees are what a phone sees held across, held upright it sees about "
                                  "{upright:.0f} from left to right; with a wrong one all depths are wrong; give --fov {upright:.0f}",
