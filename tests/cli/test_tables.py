@@ -21,8 +21,8 @@ QUALITY = SimpleNamespace(frames=12, area=0.0512, area_change=0.0123, flicker=0.
                           border={"left": 0.021, "right": 0.02, "bottom": 0.5})  # fmt: skip
 PERSON = {"height": 1.756, "distance": 2.5, "source": "references", "overlaps": {"O1": 0.912, "O2": 0.805}, "silhouettes": None,
           "start_overlap": 0.876}  # fmt: skip
-LOOK = {"recording": "lab", "camera": "cam", "size": (640, 480), "worked_size": (320, 240), "fov": 60.4, "calibrated": True, "frames": 250,
-        "rate": 29.97, "jitter": 0.0004, "scale": "by the height", "background": "a film", "key": "none", "area": 0.0512,
+LOOK = {"recording": "lab", "camera": "cam", "size": (640, 480), "worked_size": (320, 240), "fov": 60.4, "calibrated": True,
+        "lens_calibrated": True, "frames": 250, "rate": 29.97, "jitter": 0.0004, "scale": "by the height", "background": "a film", "key": "none", "area": 0.0512,
         "plain_area": 0.06, "exact_overlap": 0.9512, "exact_overlap_plain": 0.9, "quality": QUALITY, "refusal": None,
         "person": PERSON, "keypoints": None}  # fmt: skip
 
@@ -50,10 +50,12 @@ def test_the_look_at_a_recording(printed):
         "person height 1.76 m at 2.50 m; sizes from references (overlap: O1 0.91, O2 0.81); overlaps the film's first silhouette "
         "by 0.88",
     ]
-    little = LOOK | {"worked_size": (640, 480), "calibrated": False, "key": "colour: more", "plain_area": None, "exact_overlap": None,
-                     "refusal": "no", "person": PERSON | {"source": "height", "silhouettes": "hand"}}  # fmt: skip
+    little = LOOK | {"worked_size": (640, 480), "calibrated": False, "lens_calibrated": False, "key": "colour: more",
+                     "plain_area": None, "exact_overlap": None, "refusal": "no",
+                     "person": PERSON | {"source": "height", "silhouettes": "hand"}}  # fmt: skip
     found = printed(_camera_table(SimpleNamespace(**little)))
     assert found[1] == "camera cam, 640 x 480 pixels, 60 degrees wide, not calibrated"
+    assert printed(_camera_table(SimpleNamespace(**little | {"lens_calibrated": True})))[1].endswith("its lens calibrated, not its place")
     assert found[4:7] == ["background a film", "told by colour: more", "silhouettes 5.1 % of the picture, in 12 frames"]
     assert " ".join(found[7:]) == ("person height 1.76 m at 2.50 m; sizes from height; overlaps the film's first silhouette by 0.88; all "
                                    "this in clean silhouettes by hand: plain ones show no posture")
