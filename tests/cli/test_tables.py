@@ -23,8 +23,8 @@ PERSON = {"height": 1.756, "distance": 2.5, "source": "references", "overlaps": 
           "start_overlap": 0.876}  # fmt: skip
 LOOK = {"recording": "lab", "camera": "cam", "size": (640, 480), "worked_size": (320, 240), "fov": 60.4, "calibrated": True,
         "lens_calibrated": True, "frames": 250, "rate": 29.97, "jitter": 0.0004, "scale": "by the height", "background": "a film",
-        "key": "none", "area": 0.0512, "plain_area": 0.06, "exact_overlap": 0.9512, "exact_overlap_plain": 0.9, "quality": QUALITY, "refusal": None,
-        "person": PERSON, "keypoints": None}  # fmt: skip
+        "key": "none", "area": 0.0512, "plain_area": 0.06, "exact_overlap": 0.9512, "exact_overlap_plain": 0.9, "quality": QUALITY,
+        "refusal": None, "person": PERSON, "keypoints": None}  # fmt: skip
 
 
 def test_keypoints_are_listed_by_camera_with_how_far_rays_pass_each_other():
