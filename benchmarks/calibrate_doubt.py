@@ -5,9 +5,9 @@
 Every recording of the proving grounds (`synthetic.proving_ground`, `proving_rings`; made in build where they are missing) is tracked clean
 and with each fault of `FAULTS` in its silhouettes; components of doubt and errors are kept in build/doubt. The factors of a group of joints
 along an axis minimise the mean interval score of 90 % intervals (Gneiting and Raftery 2007), over all runs. Tables and pictures are of
-recordings left out: a third at a time is tested with the factors of the others; `--test` tests other recordings, as they are, with the
-factors of all made ones. `--write` writes src/shadowpuppet/tracking/doubt/factors.toml; `--markdown` the tables to their places in a
-page, and the pictures to assets beside it.
+recordings left out: a third at a time is tested with the factors of the others, and on these deviations limits are chosen. `--test` tests
+other recordings, as they are, with the factors of all made ones. `--write` writes src/shadowpuppet/tracking/doubt/factors.toml;
+`--markdown` the tables to their places in a page, and the pictures to assets beside it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -159,19 +159,18 @@ def folds(runs: Sequence[Tracked]) -> Iterator[tuple[list[Tracked], list[Tracked
 
 
 def judged(own: Sequence[Tracked], others: Sequence[Tracked]) -> tuple[list[Tested], list[LimbJoint]]:
-    """Joints and limbs of some runs, judged by factors and limits of others."""
+    """Joints and limbs of some runs, judged by factors of others."""
     known, by_joint = errors_of(others), dict[tuple[str, int], list[Array]]()
     factors = fit_all(known)
     for run in known:
         by_joint.setdefault((run.joint, run.axis), []).append(np.abs(run.errors))
     best = {key: float(np.quantile(np.concatenate(sizes), 0.9)) / WIDTH for key, sizes in by_joint.items()}
-    limits = fit_limits(limb_joints(others, factors))
-    return ([Tested(run, deviations(factors, run), best[run.joint, run.axis]) for run in errors_of(own)],
-            [each._replace(limit=limits[each.kind]) for each in limb_joints(own, factors)])
+    tested = [Tested(run, deviations(factors, run), best[run.joint, run.axis]) for run in errors_of(own)]
+    return tested, limb_joints(own, factors)
 
 
 def left_out(runs: Sequence[Tracked]) -> tuple[list[Tested], list[LimbJoint]]:
-    """Joints and limbs of all runs, judged by factors and limits of other recordings."""
+    """Joints and limbs of all runs, judged by factors of other recordings."""
     joints, limbs = zip(*itertools.starmap(judged, folds(runs)))
     return list(itertools.chain(*joints)), list(itertools.chain(*limbs))
 
@@ -202,6 +201,11 @@ def limb_joints(runs: Sequence[Tracked], factors: Factors) -> list[LimbJoint]:
             known = np.isfinite(errors[:, j])
             found.append(LimbJoint(run, limb_of(joint).rpartition("_")[2], errors[known, j], radius[known][:, own].max(1)))
     return found
+
+
+def with_limits(joints: Sequence[LimbJoint], limits: Mapping[str, float]) -> list[LimbJoint]:
+    """Limbs judged by limits (m) of their kinds."""
+    return [each._replace(limit=limits[each.kind]) for each in joints]
 
 
 def by_run(joints: Iterable[LimbJoint]) -> dict[Tracked, list[LimbJoint]]:
@@ -374,15 +378,19 @@ def main() -> None:
         with ProcessPoolExecutor(args.workers, get_context("spawn")) as pool:
             files = [file for found in pool.map(partial(collect, kind, build=args.folder, again=args.again), paths) for file in found]
         runs = read_runs(files)
-        for title, own in (("clean", [run for run in runs if run.fault == "clean"]), ("clean and spoiled", runs)):
-            joints, limbs = left_out(own)
+        joints, limbs = left_out(runs)
+        limits = fit_limits(limbs)  # by factors that know nothing of the recording, as a user's
+        clean = left_out([run for run in runs if run.fault == "clean"])
+        for title, found in (("clean", clean), ("clean and spoiled", (joints, limbs))):
+            joints, limbs = found[0], with_limits(found[1], limits)
             text = f"{joint_table(joints)}\n\n{limb_table(limbs)}"
             print(f"\n{kind}, {title}\n\n{text}", flush=True)
             if args.markdown:
                 into_page(args.markdown, f"{kind}, {title}", text)
         for path in args.test:
-            known = judged(read_runs(collect(kind, path, args.folder, args.again, clean=True)), runs)
-            print(f"\n{kind}, {path.name}\n\n{joint_table(known[0])}\n\n{limb_table(known[1])}\n\n{price_table(known[1])}", flush=True)
+            tested, own = judged(read_runs(collect(kind, path, args.folder, args.again, clean=True)), runs)
+            own = with_limits(own, limits)
+            print(f"\n{kind}, {path.name}\n\n{joint_table(tested)}\n\n{limb_table(own)}\n\n{price_table(own)}", flush=True)
         factors = fit_all(errors_of(runs))
         if any(len(run.modes) for run in runs):
             parts = list(folds(runs))
@@ -394,7 +402,7 @@ def main() -> None:
                     into_page(args.markdown, f"{kind}, {title}", text)
         if args.markdown:
             draw(args.markdown.parent / "assets" / f"doubt_{kind}.png", joints, limbs)
-        texts[kind] = factors_text(kind, runs, factors, fit_limits(limb_joints(runs, factors)))
+        texts[kind] = factors_text(kind, runs, factors, limits)
         print("\n" + texts[kind])
     if args.write:
         kept = re.split(r"(?m)^(?=\[)", TABLE.read_text("utf-8"))[1:] if TABLE.exists() else []

@@ -38,6 +38,7 @@ from shadowpuppet.tracking.doubt.monocular import MonocularDoubt
 from shadowpuppet.tracking.doubt.multiview import MultiviewDoubt, kind_of
 from shadowpuppet.tracking.doubt.variance import ModeWeights, variance_model
 from shadowpuppet.tracking.monocular.tracker import MonocularTracker
+from shadowpuppet.tracking.smoothing.deviations import moving_deviations
 from shadowpuppet.tracking.smoothing.smoothing import MotionSmoother
 
 RINGS, RING_SECONDS, RING_RATE = GROUND.parent / "rings_short", 2.0, 30.0
@@ -222,7 +223,8 @@ LATE = 5
 
 def track_multiview(path: Path, kind: str = "multiview") -> Iterator[Tracked]:
     """A recording of several cameras with every fault, or each of `SIGHTINGS` if keypoints are evidence. Errors are those of the smoothed
-    motion, which is what a run's deviations are stated of: the backward pass keeps feet on the floor."""
+    motion, which is what a run's deviations are stated of: the backward pass keeps feet on the floor. So are components, where a run
+    restates its deviations (`FittedPerson.limits`)."""
     late: Fault = lambda rng, masks, rate: [masks[max(n - LATE, 0)] for n in range(len(masks))]  # noqa: E731
     if kind in ("multiview", "pair"):
         yield from tracked_with(path, make_options({"evidence": "silhouettes"}), FAULTS | {"late": late})
@@ -269,6 +271,8 @@ def tracked_with(path: Path, options: Options, faults: Mapping[str, Fault]) -> I
         errors = _places(at_times(truth, np.array(times)), names) - body.points(poses)
         some = next(row for row in rows if row is not None)
         components = {name: np.array([np.zeros((len(names), 3)) if row is None else row[name] for row in rows]) for name in some}
+        if subject.limits is not None:
+            components = {name: moving_deviations(np.array(times), each) for name, each in components.items()}
         yield Tracked(path.name, fault, names, components, errors, np.empty((0, 2)))
 
 

@@ -258,7 +258,7 @@ def test_a_line_of_progress_does_not_fall_into_what_is_printed_next():
     assert printed == ["... looking"]
 
 
-def test_compiling_is_said_once(capsys, monkeypatch):
+def test_compiling_is_said_once_a_phase(capsys, monkeypatch):
     monkeypatch.setattr(terminal_module, "LOG_EVERY", 0.02)
     monkeypatch.setattr(terminal_module, "monotonic", functools.partial(next, itertools.count(0, 0.001)))
     with terminal_module.terminal() as listener:
@@ -267,10 +267,12 @@ def test_compiling_is_said_once(capsys, monkeypatch):
         with event.trigger_event("numba:compile", data={}):
             assert jit.is_compiling()
             lines += printed_until(capsys, "(a minute or two)")
+            later = [line for _ in range(2) for line in printed_until(capsys, "... measuring")]
             listener.begin("tracking")
-            later = [line for _ in range(2) for line in printed_until(capsys, "... tracking")]
+            tracking = printed_until(capsys, "... tracking")
         assert not jit.is_compiling()
     assert not any("compiling" in line for line in later)
+    assert tracking[-1].endswith(", compiling, once (a minute or two)")
     assert not lines[0].endswith("(a minute or two)")
     assert lines[-1] == "... measuring the person, 0 s, compiling, once (a minute or two)"
 

@@ -26,6 +26,7 @@ from shadowpuppet.pipeline.options import make_options
 from shadowpuppet.pipeline.rig import open_rig
 from shadowpuppet.pipeline.silhouettes import Silhouettes
 from shadowpuppet.pipeline.track import track_recording
+from shadowpuppet.tracking.doubt.variance import variance_model
 from shadowpuppet.tracking.multiview.settings import for_smeared
 from shadowpuppet.tracking.multiview.size_estimation import Front
 from shadowpuppet.tracking.multiview.tracker import MultiviewTracker
@@ -151,6 +152,16 @@ def test_films_of_two_cameras_are_tracked_both_ways_unless_keypoints_show_the_fr
                                       Person(TRUE, 1.75, "known"), {}, True)
     assert not subject.both_ways
     assert dataclasses.replace(subject, silhouettes_alone=True).both_ways
+
+
+def test_deviations_are_restated_of_silhouettes_of_three_cameras_or_more():
+    def limits(cameras: int, alone: bool):
+        subject = person_rig.known_person(np.random.default_rng(0), actor.cameras()[:cameras], make_options(FEW), made_rig.RATE,
+                                          Person(TRUE, 1.75, "known"), {}, True)
+        return dataclasses.replace(subject, silhouettes_alone=alone).limits
+
+    assert limits(3, True) == variance_model("multiview").limits
+    assert limits(2, True) is limits(3, False) is None
 
 
 @pytest.mark.parametrize(("smeared", "emptiness", "silhouettes"), [(False, 2.0, 0.1), (True, 0.5, 0.05)])

@@ -14,7 +14,7 @@ from shadowpuppet.calibration.silhouettes import Row, outlines_of, silhouettes_o
 from shadowpuppet.camera.camera import Camera
 from shadowpuppet.camera.mask import Mask
 from shadowpuppet.errors import HARMFUL, RUINOUS, Finding
-from shadowpuppet.geometry import Array, evenly_spread, inverse, rigid
+from shadowpuppet.geometry import Array, evenly_spread, inverse, rigid, unit
 from shadowpuppet.threads import MadeOnDemand
 
 MAX_DISAGREEMENT = 0.01
@@ -162,16 +162,18 @@ class _Scene:
         return rest, w
 
     def height(self) -> float | None:
-        """Median of the silhouettes' greatest extents at the triangulated person, metres; None if unknown."""
+        """Median of the silhouettes' greatest extents at the triangulated person, across the view, metres; None if unknown."""
+        from scipy.spatial.distance import pdist
+
         heights = []
         for row in self.spread(SETS_COMPARED):
             outlines = outlines_of(self.cameras, row)
             middle = triangulated_centre(self.cameras, outlines)
             for camera, outline in zip(self.cameras, outlines):
                 if middle is not None and outline is not None:
-                    mean = outline.rays.mean(0)
-                    angle = np.arccos(np.clip((outline.rays @ mean).min() / np.linalg.norm(mean), 0.1, 1))
-                    heights.append(2 * np.tan(angle) * np.linalg.norm(middle - camera.centre))
+                    mean = unit(outline.rays.mean(0))
+                    across = outline.rays / np.maximum(outline.rays @ mean, 0.1)[:, None]
+                    heights.append(pdist(across).max() * np.linalg.norm(middle - camera.centre))
         return float(np.median(heights)) if heights else None
 
 

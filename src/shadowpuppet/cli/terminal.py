@@ -56,7 +56,7 @@ class LogLines:
 
     def _run(self, end: threading.Event) -> None:
         while not end.wait(self._pause()):
-            compiling = "" if self._compiled else _compiling()  # said once
+            compiling = "" if self._compiled else _compiling()  # said once a phase
             self._compiled = self._compiled or bool(compiling)
             self.console.print(printable(f"{PROGRESS} {self._line()}{compiling}"), soft_wrap=True)
 
@@ -71,6 +71,7 @@ class _Log(LogLines):
     def begin(self, what: str, total: int | None) -> None:
         """A phase begins; the thread that prints starts with the first."""
         self.what, self.total, self.done, self.before, self.began = what, total, 0, 0, monotonic()
+        self._compiled = False
         self.start()
 
     def advance(self, frames: int) -> None:

@@ -84,6 +84,9 @@ def track(recording: RecordingPath, /, *, folder: Annotated[Path | None, output(
     if not quiet:
         _show_run(folder, metrics)
         _show_project(recording, folder)
+        if metrics.get("verdict", {}).get("word") != "good":
+            show_next(typed("view", folder))
+            say("  `info` with the recording's own flags and --verbose says what to do about each reason on the film")
     if lost_share(motion) <= MOSTLY_LOST:
         return 0
     say(f"the person is lost: {'; '.join(metrics.get('verdict', {}).get('reasons', ()))}", error=True)

@@ -3,7 +3,7 @@ first seconds; a motion prior."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -127,6 +127,11 @@ class MultiviewSubject(TrackedSubject[MultiviewState, HullObservation, Before]):
         if state is None or state.pose is None or state.status in BLANK:
             return ()
         return tuple(picture.draw(np.asarray(state.pose)) for picture in self.tracker.views.pictures)
+
+    @property
+    def limits(self) -> Mapping[str, float] | None:
+        """See `FittedPerson`: by silhouettes of three cameras or more, whose doubt is calibrated so."""
+        return variance_model("multiview").limits if self.silhouettes_alone and not self.tracker.sees_quarters_alike else None
 
     @property
     def both_ways(self) -> bool:

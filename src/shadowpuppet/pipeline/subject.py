@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Generic, NamedTuple, Protocol, Self, TypeVar
@@ -82,6 +82,11 @@ class FittedPerson:
     """Doubts about the fit, a sentence each."""
     beside: tuple[BesideBody | None, ...] = ()
     """What the body leaves unexplained in each camera's silhouettes; empty, or None, for nothing."""
+
+    @property
+    def limits(self) -> Mapping[str, float] | None:
+        """Of each kind of limb, metres, for what a smoothed motion says of its limbs (`MotionSmoother.limits`)."""
+        return None
 
     def landmarks(self, poses: Array) -> Array:
         """Landmarks (N, L, 3) of poses (N, D) in the world, metres."""

@@ -21,7 +21,7 @@ def check_folder(folder: Path) -> bool:
     info = folder / "run.toml"
     if not info.exists() or not {"complete", "versions"} <= set(read_toml(info, FormatError)):
         raise ShadowPuppetError(f"{folder}: found {shorten(names, 60)} in it but no run.toml of a run, expected a new or empty "
-                                "folder, or that of an earlier run, which is replaced")
+                                "folder, or that of an earlier run")
     return True
 
 

@@ -34,7 +34,8 @@ def smooth_run(writer: RunWriter, subjects: Sequence[tuple[int, FittedPerson]], 
         return
     listener.begin("smoothing")
     start, away = time.perf_counter(), options.facing == "away"
-    parts = [(begin, MotionSmoother(subject.body.skeleton, subject.joints, method, options.cutoff, gaps, away))
+    parts = [(begin, MotionSmoother(subject.body.skeleton, subject.joints, method, options.cutoff, gaps, away,
+                                    subject.limits))
              for begin, subject in subjects]
     try:
         found = smoothed_parts(motion, parts, np.full(len(motion), np.nan) if leans is None else np.array(leans))

@@ -9,8 +9,9 @@ import numpy as np
 
 from shadowpuppet.body.skeleton import Skeleton
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.limbs import joints_of_limbs, limbs_of
+from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import Mode
+from shadowpuppet.tracking.doubt.limbs import beyond
 from shadowpuppet.tracking.doubt.variance import Components, turned, variance_model
 
 STEP = 1e-4
@@ -91,8 +92,6 @@ def limb_statuses(limits: Mapping[str, float], names: Sequence[str], sd: Array, 
     """
     if evidence.frozen:
         return ("predicted",) * len(limbs_of(names))
-    radius, out = np.sqrt((sd**2).sum(1)), list[str]()
-    for limb, own in joints_of_limbs(tuple(names)).items():
-        sure = status == "tracked" and radius[own].max() <= limits[limb.rpartition("_")[2]]
-        out.append("tracked" if sure else "predicted" if evidence.unseen.get(limb, 0.0) > UNSEEN else "uncertain")
-    return tuple(out)
+    doubted = ["predicted" if evidence.unseen.get(limb, 0.0) > UNSEEN else "uncertain" for limb in limbs_of(names)]
+    sure = [status == "tracked" and not off for off in beyond(limits, names, sd)]
+    return tuple("tracked" if each else other for each, other in zip(sure, doubted))

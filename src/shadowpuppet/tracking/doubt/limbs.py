@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shadowpuppet.body.shapes import Body
 from shadowpuppet.body.skeleton import SIDES
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.limbs import doubtful_joints, doubtful_limbs
+from shadowpuppet.motion.limbs import doubtful_joints, doubtful_limbs, joints_of_limbs
 
 GROUPS = {"pelvis": ("pelvis",), "neck": ("neck", "head"), "shoulder": ("shoulder",), "elbow": ("elbow",),
           "hand": ("wrist", "hand", "fist"), "hip": ("hip",), "knee": ("knee",), "ankle": ("ankle",),
@@ -46,6 +47,14 @@ def limb_of_part(part: str) -> str:
     if side not in SIDES or name in ("", "shoulder"):
         return "trunk"
     return f"{side}_leg" if name in LEG_PARTS else f"{side}_arm"
+
+
+def beyond(limits: Mapping[str, float], joints: Sequence[str], sd: Array) -> NDArray[np.bool_]:
+    """Whether a joint of each limb (..., limbs), by the deviations (..., L, 3), metres, of `joints`, is off by more than the limit (m) for
+    limbs of its kind, all axes together; what is not a number is."""
+    radius = np.sqrt((sd**2).sum(-1))
+    limbs = joints_of_limbs(tuple(joints)).items()
+    return np.stack([~(radius[..., own].max(-1) <= limits[limb.rpartition("_")[2]]) for limb, own in limbs], -1)
 
 
 def doubtful_names(body: Body, statuses: Sequence[str] | None) -> frozenset[str]:

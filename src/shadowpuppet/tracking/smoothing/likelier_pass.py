@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shadowpuppet.geometry import Array, wrapped
-from shadowpuppet.motion.limbs import joints_of_limbs
 from shadowpuppet.motion.motion import SCALARS, Motion
+from shadowpuppet.tracking.doubt.limbs import beyond
 from shadowpuppet.tracking.smoothing.projection import Points
 
 
@@ -27,8 +27,8 @@ def likelier(forward: Motion, backward: Motion, evidence: Array, points: Points,
         evidence: log odds (T,), per second, of each frame alone that the backward pass is right.
         points: from poses (N, D) to the motion's joints (N, J, 3), metres, world.
         averaged: whether poses are means by weight; else those of the likelier pass, as what is between two fronts is neither.
-        limits: a limb that is `tracked` in the likelier pass is `uncertain` where the other place of it takes a joint's deviation over the
-            limit (m) for limbs of its kind (`limb_statuses`); None: statuses are those of the likelier pass.
+        limits: a limb that is `tracked` in the likelier pass is `uncertain` where the other place of it takes it `beyond` these; None:
+            statuses are those of the likelier pass.
         alone: frames (T,) in which the forward pass alone counts, if it has a pose.
 
     Deviations are those of a mixture.
@@ -47,10 +47,8 @@ def likelier(forward: Motion, backward: Motion, evidence: Array, points: Points,
     ahead, behind = (motion.joints - chosen["joints"] for motion in (forward, backward))
     joint_sd = _deviations(share, (ahead, behind), (forward.joint_sd, backward.joint_sd))
     if limits is not None:
-        radius = np.sqrt((joint_sd**2).sum(2))
-        for n, (limb, own) in enumerate(joints_of_limbs(forward.joint_names).items()):
-            over = both & (radius[:, own].max(1) > limits[limb.rpartition("_")[2]])
-            chosen["limb_status"][over & (chosen["limb_status"][:, n] == "tracked"), n] = "uncertain"
+        over = both[:, None] & beyond(limits, forward.joint_names, joint_sd)
+        chosen["limb_status"][over & (chosen["limb_status"] == "tracked")] = "uncertain"
     return replace(forward, pose_sd=pose_sd, joint_sd=joint_sd, **chosen), back.astype(float)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from shadowpuppet.motion.contact.contact import contacts_of
 from shadowpuppet.motion.interpolation import filled, true_runs
 from shadowpuppet.motion.motion import PER_FRAME, Motion
 from shadowpuppet.tracking.smoothing.butterworth import PASSES, filtered
+from shadowpuppet.tracking.smoothing.deviations import restated
 from shadowpuppet.tracking.smoothing.facing import Faced, turned_on
 from shadowpuppet.tracking.smoothing.fixed_interval import INDEPENDENT, LEAST, ORDER, Smoothed, differences, smooth
 from shadowpuppet.tracking.smoothing.gaps import bridged, stray
@@ -74,6 +75,8 @@ class MotionSmoother:
     """Longest gap that is bridged, seconds; 0: none."""
     away: bool = False
     """Whether one camera first sees the person from behind."""
+    limits: Mapping[str, float] | None = None
+    """Of each kind of limb, metres, if deviations and statuses are to be `restated`; None: they stay those of each frame alone."""
 
     def __call__(self, motion: Motion, leans: Array | None = None) -> SmoothedMotion:
         """A motion smoothed in runs of known frames; `leans` (T,): of the head in a profile (`head_lean`). Raises `SettingsError` for a
@@ -181,6 +184,8 @@ class MotionSmoother:
         changed = inside if self.method == "off" else motion.known | inside
         poses, joints = np.where(changed[:, None], poses, motion.poses), motion.joints.copy()
         joints[changed] = self.points(poses[changed])
+        if self.limits is not None and self.method != "off":
+            motion = restated(motion, self.limits)
         joint_sd, pose_sd = _grown(motion, joints, inside)
         status, limbs = motion.status.copy(), motion.limb_status.copy()
         status[inside], limbs[inside] = "predicted", "predicted"
