@@ -16,12 +16,13 @@ from shadowpuppet.silhouette.correction.condition import FilmCondition
 GOOD = 0.9
 """Overlap with ready silhouettes below which the segmentation is in doubt."""
 AT_TIMES, MOSTLY = 0.1, 0.5
-"""Shares of a camera's frames with cut off feet from which on that is worth a word, and it does not show them."""
+"""Shares of a camera's frames from which on it is worth a word that feet are cut off, or that the person sits, and that it does not show
+the feet."""
 SHAPE = 0.03
 """Relative difference in the shapes of pixels, width over height, from which on a calibration is not the film's."""
-LOWER, SMALLER, OFTEN = 0.25, 0.75, 0.1
+LOWER, SMALLER = 0.25, 0.75
 """How much lower the silhouette's top is, over the root of its area, and how large that area at most, over those while the person stands,
-where they sit; and the least share of such frames. Who bows keeps the area, who turns the height."""
+where they sit. Who bows keeps the area, who turns the height."""
 
 
 def added_cautions(added: str | None) -> list[Finding]:
@@ -86,7 +87,7 @@ def sitting_cautions(masks: Sequence[Mask], times: Sequence[float]) -> list[Find
     standing = tops <= np.percentile(tops, 50)
     top, area = np.median(tops[standing]), np.median(areas[standing])
     low = np.flatnonzero((tops > top + LOWER * area**0.5) & (areas < SMALLER * area))
-    if len(low) < max(OFTEN * len(seen), 1):
+    if len(low) < max(AT_TIMES * len(seen), 1):
         return []
     return [Finding.of("in {percent:.0f} % of the frames, first at {seconds:.1f} s, the person is lower and smaller in the picture: they "
                        "sit down, kneel or go away, which an upper body cannot follow; cut the film with --start and --end, or track the "

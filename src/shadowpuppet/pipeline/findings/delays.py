@@ -19,8 +19,6 @@ from shadowpuppet.threads import usable_cores
 
 SECONDS, SETS = 3.0, 45
 """Greatest length (s) that is read, of the films' middle as at first people often stand still, and greatest number of sets of it."""
-LEAST = 1.0
-"""Frames by which a film must be late for the recording to be in doubt."""
 
 
 def delay_cautions(rig: Rig, silhouettes: Sequence[Silhouettes], first: FirstSeconds, ready: bool) -> list[Finding]:
@@ -36,7 +34,7 @@ def delay_cautions(rig: Rig, silhouettes: Sequence[Silhouettes], first: FirstSec
     else:
         every, rows = opening_of(rig).every, [silhouettes_of(masks) for masks in first.masks]
     shifts = certain_offsets(time_offsets(rig.cameras, rows))
-    late = {name: sets * every for name, sets in zip(rig.names, shifts) if abs(sets * every) > LEAST}
+    late = {name: sets * every for name, sets in zip(rig.names, shifts) if abs(sets * every) > 1}
     if not late or compare_cameras(rig.cameras, aligned_sets(rows, shifts), remedies=False).wrong:
         return []
     return [Finding(f"the films do not begin together ({delays_in_words(late)}): `shadowpuppet check --fix` measures that and writes it "
