@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import importlib
+import inspect
 import io
 import itertools
 import json
@@ -724,3 +726,13 @@ def test_the_speed_of_a_resumed_run_is_that_of_its_own_frames(monkeypatch):
     for frame in range(61, 69):
         log.advance(frame)
     assert log._text() == "tracking 68/80, 2.0 a second, 4 s"
+
+
+@pytest.mark.parametrize("place", cli.COMMANDS.values())
+def test_lines_of_a_commands_help_end_where_sentences_do(place):
+    module, name = place.split(":")
+    text = inspect.cleandoc(getattr(importlib.import_module(f"shadowpuppet.cli.{module}"), name).__doc__)
+    for line, following in itertools.pairwise(text.partition("\n\n")[2].splitlines()):  # the first paragraph flows
+        indents = [len(each) - len(each.lstrip()) for each in (line, following)]
+        if line and following and indents[0] == indents[1] and "---" not in line + following:
+            assert line.endswith((".", ":", ";")), line

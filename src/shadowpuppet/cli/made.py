@@ -42,8 +42,8 @@ else:
 def masks(source: Source = None, /, *, flags: Flags = None) -> None:
     """Let another program make the silhouettes, such as a neural network, in an environment of its own; then `track` them with --masks.
 
-    The script is code of others that you choose: it runs with your rights. Its packages are installed into an environment of their own when
-    it is first used (by uv if that is there), and kept.
+    The script is code of others that you choose: it runs with your rights.
+    Its packages are installed into an environment of their own when it is first used (by uv if that is there), and kept.
     """
     _make(("masks",), source, flags or How())
 
@@ -52,8 +52,8 @@ def keypoints(source: Source = None, /, *,
               masks: Annotated[bool, switch("Let the script make masks too, in the same pass.")] = False, flags: Flags = None) -> None:
     """Let another program find the keypoints, joints in the pictures, such as a neural network, in an environment of its own.
 
-    The script is code of others that you choose: it runs with your rights. Its packages are installed into an environment of their own when
-    it is first used (by uv if that is there), and kept.
+    The script is code of others that you choose: it runs with your rights.
+    Its packages are installed into an environment of their own when it is first used (by uv if that is there), and kept.
     """
     _make(("keypoints", "masks") if masks else ("keypoints",), source, flags or How())
 

@@ -43,9 +43,9 @@ def calibrate(lab: Annotated[Path | None, Parameter(help="Folder with board.toml
     """Calibrate the cameras of a lab from films of a board: lenses from a board shown to each camera, places from one carried through the
     room before several, the floor from one that lies on it.
 
-    Writes LAB/calibration.toml, and LAB/calibration.html with errors, coverage, places, and what to film again. Exit code 1 if something
-    should be filmed again. With --from-person no board is needed: lenses are those of the rough calibration; fields of
-    view in rough.toml are refined.
+    Writes LAB/calibration.toml, and LAB/calibration.html with errors, coverage, places, and what to film again.
+    Exit code 1 if something should be filmed again.
+    With --from-person no board is needed: lenses are those of the rough calibration; fields of view in rough.toml are refined.
     """
     if print_board is not None:
         from shadowpuppet.calibration.boards.printing import write_board

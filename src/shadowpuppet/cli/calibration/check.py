@@ -10,25 +10,34 @@ from cyclopts import Parameter
 from rich.console import Group, RenderableType
 
 from shadowpuppet.cli.calibration.explain import is_explained
-from shadowpuppet.cli.flags import AsJson, Config, LookFlags, Switch, options_from
+from shadowpuppet.cli.flags import AsJson, Config, Switch, flags_of, options_from, unpacked
 from shadowpuppet.cli.tables import pairs, seen_height, show, show_json, table
 from shadowpuppet.errors import RecordingError
+from shadowpuppet.pipeline.options import Options
 
 if TYPE_CHECKING:
     from shadowpuppet.pipeline.repair.check import CalibrationCheck
     from shadowpuppet.pipeline.repair.fix import Fix
 
+    CheckFlags = Any
+else:
+    NOT_ASKED = ("every", "smooth", "facing", "appearance", "cutoff", "gaps", "overlay", "anyway", "body", "prior", "distance",
+                 "fov", "background", "region")  # fmt: skip
+    CheckFlags = unpacked(flags_of(Options, without=NOT_ASKED))
+    """Options of what is looked at in films of several cameras, without tracking."""
+
 
 def check(recording: Annotated[Path, Parameter(help="Folder with video/ and a calibration, of two cameras or more.")], /, *,
-          fix: Switch = False, config: Config = None, as_json: AsJson = False, flags: LookFlags = None) -> None:
+          fix: Switch = False, config: Config = None, as_json: AsJson = False, flags: CheckFlags = None) -> None:
     """Test a calibration against the silhouettes of a recording: which camera disagrees with the others, by how many pixels, how far it was
     turned; and by how many frames each film is late.
 
     Parameters
     ----------
     fix
-        Write what is certain: films' delays into [start] of recording.toml, turned cameras, and a wrong scale if --height is
-        given, into a new calibration.toml; the old files are kept beside them. Shows the disagreement in pixels before and after.
+        Write what is certain: films' delays into [start] of recording.toml;
+        turned cameras, and a wrong scale if --height is given, into a new calibration.toml; the old files are kept beside them.
+        Shows the disagreement in pixels before and after.
     """
     from shadowpuppet.cli.terminal import terminal
     from shadowpuppet.pipeline.repair.films import check_films
