@@ -17,7 +17,6 @@ from shadowpuppet.motion.motion import Motion, MotionBuilder, MotionFrame
 from shadowpuppet.pipeline.findings.look import Look, RigLook
 from shadowpuppet.pipeline.findings.verdict import (
     Verdict,
-    _together,
     blind_frames,
     expected_error,
     lost_share,
@@ -219,7 +218,14 @@ def test_what_the_look_found_is_among_the_reasons():
     assert verdict[:2] == ("doubtful", ("film is noisy: use more light", "left arm doubtful in 20 % of frames"))
 
 
-def test_arms_and_legs_take_one_reason_each():
-    shares = {"trunk": 0.2, "left_arm": 0.98, "right_arm": 0.91, "left_leg": 0.5, "right_leg": 0.504}
-    assert _together(["trunk", "left_arm", "right_arm"], shares) == [("both arms", 91.0, 98.0), ("trunk", 20.0, 20.0)]
-    assert [named for named, _, _ in _together(["left_leg", "right_leg", "left_arm"], shares)] == ["left arm", "both legs"]
+@pytest.mark.parametrize(("limbs", "reason"), [(("left_arm",), "left arm doubtful in 80 % of frames"),
+                                               (("trunk", "left_arm"), "trunk, left arm doubtful in 70 to 80 % of frames"),
+                                               (("left_arm", "right_arm"), "both arms doubtful in 80 to 90 % of frames"),
+                                               (("trunk", "left_arm", "right_arm"), "all limbs doubtful in 70 to 90 % of frames")])
+def test_limbs_that_are_often_doubtful_take_one_reason(limbs, reason):
+    often, clean = {"trunk": 7, "left_arm": 8, "right_arm": 9}, motion(0.03)
+    statuses = clean.limb_status.copy()
+    for limb in limbs:
+        statuses[: often[limb], clean.limbs.index(limb)] = "uncertain"
+    found = verdict_of_run(replace(LOOK, findings=()), replace(clean, limb_status=statuses))
+    assert [each for each in found.reasons if "doubtful" in each] == [reason]

@@ -218,16 +218,8 @@ def _doubtful_limbs(motion: Motion, kind: int, lengths: Array, limbs: Sequence[s
     often = [limb for limb, share in shares.items() if share > OFTEN_DOUBTFUL[kind] and not errors[limb] <= WIDE_LIMB[kind]]
     at_times = [limb for limb, share in shares.items() if share > OFTEN_LOST and limb not in often]
     for some, weight in ((often, HARMFUL), (at_times, NOTED)):
-        for named, least, most in _together(some, shares):
+        if some:
+            named = "all limbs" if len(some) == len(motion.limbs) > 1 else limbs_in_words(some)
+            least, most = (100 * edge(shares[limb] for limb in some) for edge in (min, max))
             share = "{least:.0f}" if round(least) == round(most) else "{least:.0f} to {most:.0f}"
             yield _brief(f"{named} doubtful in {share} % of frames", weight, least=least, most=most)
-
-
-def _together(limbs: Sequence[str], shares: Mapping[str, float]) -> list[tuple[str, float, float]]:
-    """Limbs in words, arms and legs together so that they take one reason, and the least and greatest per cent of their frames, the most
-    doubtful first."""
-    kinds = dict[str, list[str]]()
-    for limb in limbs:
-        kinds.setdefault(limb.rpartition("_")[2], []).append(limb)
-    found = [(limbs_in_words(some), [100 * shares[limb] for limb in some]) for some in kinds.values()]
-    return sorted(((named, min(values), max(values)) for named, values in found), key=lambda one: -one[2])
