@@ -380,10 +380,9 @@ def main() -> None:
         runs = read_runs(files)
         joints, limbs = left_out(runs)
         limits = fit_limits(limbs)  # by factors that know nothing of the recording, as a user's
-        clean = left_out([run for run in runs if run.fault == "clean"])
-        for title, found in (("clean", clean), ("clean and spoiled", (joints, limbs))):
-            joints, limbs = found[0], with_limits(found[1], limits)
-            text = f"{joint_table(joints)}\n\n{limb_table(limbs)}"
+        limbs, clean = with_limits(limbs, limits), left_out([run for run in runs if run.fault == "clean"])
+        for title, tested, own in (("clean", clean[0], with_limits(clean[1], limits)), ("clean and spoiled", joints, limbs)):
+            text = f"{joint_table(tested)}\n\n{limb_table(own)}"
             print(f"\n{kind}, {title}\n\n{text}", flush=True)
             if args.markdown:
                 into_page(args.markdown, f"{kind}, {title}", text)

@@ -107,13 +107,15 @@ def _parameter(setting: Setting, visible: bool, groups: Mapping[str, Group]) -> 
     return Parameter(help=setting.help + end, show=visible, group=groups.get(setting.name, OTHER))
 
 
+OF_TRACKING = ("every", "smooth", "facing", "appearance", "cutoff", "gaps", "overlay")
+"""Options that only tracking has."""
 if TYPE_CHECKING:
     Flags = RunFlags = LookFlags = OutletFlags = Any
 else:
     Flags = flags_of(Options)
     RunFlags = unpacked(Flags)
     """All options."""
-    LookFlags = unpacked(flags_of(Options, without=("every", "smooth", "facing", "appearance", "cutoff", "gaps", "overlay")))
+    LookFlags = unpacked(flags_of(Options, without=OF_TRACKING))
     """Options of commands that do not track."""
     OutletFlags = unpacked(flags_of(OutletSettings))
     """Programs that receive the motion."""

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shadowpuppet.errors import ShadowPuppetError
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.motion import JointTable
+from shadowpuppet.motion.motion import ROUNDING, JointTable
 
 FRAME_TOLERANCE = 0.2
 """Share of a step by which a frame may lie off a uniform time: films' times are rounded to milliseconds, cameras' jitter."""
@@ -135,3 +135,11 @@ def true_runs(known: ArrayLike) -> list[tuple[int, int]]:
     """Starts and ends of the runs of true values in (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], np.asarray(known, bool), [False]]).astype(int)))
     return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
+
+
+def sums_about(times: Array, values: ArrayLike, reach: float) -> Array:
+    """Sums (T, ...) of values (T, ...) over the frames within `reach` of each of `times` (T,), seconds."""
+    values = np.asarray(values)
+    sums = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, 0)])
+    first, last = (np.searchsorted(times, times + side * (reach + ROUNDING)) for side in (-1, 1))
+    return sums[last] - sums[first]

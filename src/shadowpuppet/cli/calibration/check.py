@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from rich.console import Group, RenderableType
 
 from shadowpuppet.cli.calibration.explain import is_explained
-from shadowpuppet.cli.flags import AsJson, Config, Switch, flags_of, options_from, unpacked
+from shadowpuppet.cli.flags import OF_TRACKING, AsJson, Config, Switch, flags_of, options_from, unpacked
 from shadowpuppet.cli.tables import pairs, seen_height, show, show_json, table
 from shadowpuppet.errors import RecordingError
 from shadowpuppet.pipeline.options import Options
@@ -21,9 +21,8 @@ if TYPE_CHECKING:
 
     CheckFlags = Any
 else:
-    NOT_ASKED = ("every", "smooth", "facing", "appearance", "cutoff", "gaps", "overlay", "anyway", "body", "prior", "distance",
-                 "fov", "background", "region")  # fmt: skip
-    CheckFlags = unpacked(flags_of(Options, without=NOT_ASKED))
+    NOT_ASKED = ("anyway", "body", "prior", "distance", "fov", "background", "region")
+    CheckFlags = unpacked(flags_of(Options, without=(*OF_TRACKING, *NOT_ASKED)))
     """Options of what is looked at in films of several cameras, without tracking."""
 
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.motion import ROUNDING, Motion
+from shadowpuppet.motion.interpolation import sums_about
+from shadowpuppet.motion.motion import Motion
 from shadowpuppet.tracking.doubt.limbs import beyond
 
 REACH = 0.5
@@ -20,10 +21,7 @@ def moving_deviations(times: Array, sd: Array) -> Array:
     """Root mean squares (T, ...) of the known ones of deviations (T, ...) within `REACH` of each frame at `times` (T,), seconds; what is
     not a number stays so."""
     known = np.isfinite(sd)
-    nil, own = np.zeros((1, *sd.shape[1:])), np.where(known, sd, 0.0)
-    squares, counts = (np.concatenate([nil, np.cumsum(each, 0)]) for each in (own**2, known))
-    first, last = np.searchsorted(times, times - REACH - ROUNDING), np.searchsorted(times, times + REACH + ROUNDING)
-    means = (squares[last] - squares[first]) / np.maximum(counts[last] - counts[first], 1)
+    means = sums_about(times, np.where(known, sd, 0.0) ** 2, REACH) / np.maximum(sums_about(times, known, REACH), 1)
     return np.where(known, np.sqrt(np.maximum(means, 0.0)), np.nan)
 
 

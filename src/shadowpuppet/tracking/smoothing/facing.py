@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from shadowpuppet.body.skeleton import other_side
 from shadowpuppet.body.upper_body import BEND, TWIST
 from shadowpuppet.geometry import Array
-from shadowpuppet.motion.interpolation import filled, true_runs
+from shadowpuppet.motion.interpolation import filled, sums_about, true_runs
 from shadowpuppet.motion.limbs import limbs_of
 from shadowpuppet.motion.motion import Motion
 
@@ -70,9 +70,7 @@ def about_profile(motion: Motion) -> NDArray[np.bool_]:
     if TWIST not in motion.dof_names:
         return np.zeros(len(motion), bool)
     near = np.abs(np.nan_to_num(motion.poses[:, motion.dof_names.index(TWIST)])) > NEAR
-    number = np.concatenate([[0], np.cumsum(near)])
-    first, last = (np.searchsorted(motion.times, motion.times + side * (BESIDE + 1e-6)) for side in (-1, 1))
-    return number[last] > number[first]
+    return sums_about(motion.times, near, BESIDE) > 0
 
 
 class Faced(NamedTuple):
